@@ -1,0 +1,1 @@
+"""KRL: program model, preflight, writer, and a reader of its own that proves every exported program."""

@@ -1,0 +1,1 @@
+"""The inspection surface: which triangles, their edges, and the smooth surface behind them."""

@@ -1,0 +1,63 @@
+"""`InspectionSurface`: the triangles of a part that are inspected."""
+
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+from numpy.typing import NDArray
+
+from planner.frames import Array
+from planner.part import Faces, Part
+
+
+@dataclass(frozen=True, eq=False)
+class InspectionSurface:
+    """A connected, outward-facing set of triangles of `part` (frame `part`, mm).
+
+    part_faces (k,) int32: indices into `part.faces`, ascending.
+    """
+
+    part: Part
+    part_faces: NDArray[np.int32]
+
+    @cached_property
+    def _compact(self) -> tuple[Array, Faces]:
+        used, inverse = np.unique(self.part.faces[self.part_faces], return_inverse=True)
+        return self.part.vertices[used], inverse.reshape(-1, 3).astype(np.int32)
+
+    @property
+    def vertices(self) -> Array:
+        """Vertices used by the surface (v, 3), mm."""
+        return self._compact[0]
+
+    @property
+    def faces(self) -> Faces:
+        """Triangles (k, 3) into `vertices`; row i is `part.faces[part_faces[i]]`."""
+        return self._compact[1]
+
+    @property
+    def face_normals(self) -> Array:
+        """Unit outward normals (k, 3)."""
+        return self.part.face_normals[self.part_faces]
+
+    @property
+    def face_areas_mm2(self) -> Array:
+        """Areas (k,), mm2."""
+        return self.part.face_areas_mm2[self.part_faces]
+
+    @cached_property
+    def area_mm2(self) -> float:
+        """Total area (mm2)."""
+        return float(self.face_areas_mm2.sum())
+
+    @cached_property
+    def centroid_part(self) -> Array:
+        """Area centroid (3,), mm."""
+        centres = self.vertices[self.faces].mean(axis=1)
+        return np.asarray(np.average(centres, axis=0, weights=self.face_areas_mm2))
+
+    @cached_property
+    def mean_normal_part(self) -> Array:
+        """Area-weighted mean outward normal (3,), unit length."""
+        n = self.face_areas_mm2 @ self.face_normals
+        return np.asarray(n / np.linalg.norm(n))
