@@ -58,6 +58,7 @@ class InspectionSurface:
 
     @cached_property
     def mean_normal_part(self) -> Array:
-        """Area-weighted mean outward normal (3,), unit length."""
+        """Area-weighted mean outward normal (3,), unit length; +Z of `part` for a closed body, which has none."""
         n = self.face_areas_mm2 @ self.face_normals
-        return np.asarray(n / np.linalg.norm(n))
+        length = np.linalg.norm(n)
+        return np.asarray(n / length) if length > 1e-6 * self.area_mm2 else np.array([0.0, 0.0, 1.0])

@@ -1,0 +1,188 @@
+"""`CurvedSurface`: the smooth surface behind the triangles of an inspection surface."""
+
+from functools import cached_property
+
+import igl
+import numpy as np
+from numpy.typing import NDArray
+
+from planner.frames import Array
+from planner.setup import Probe
+from planner.surface.closest import Foot
+from planner.surface.inspection import InspectionSurface
+from planner.surface.patch import pn_normals, pn_points
+from planner.surface.rays import Scene
+from planner.surface.topology import edges_of, weld, weld_tolerance_mm
+from planner.surface.vertex_fit import VertexFit, fit_vertices
+
+FOOT_STEPS = 6
+FOOT_TOLERANCE_MM = 1e-6
+
+
+def footprint_mm(probe: Probe) -> float:
+    """Return the radius over which the probe averages the surface (mm): half the larger of beam, aperture and elevation.
+
+    The paper's cell (15 elements of 0.6 mm, 9 mm elevation): 4.5 mm.
+    """
+    return 0.5 * max(probe.beam_width_mm, probe.aperture_elements * probe.pitch_mm, probe.elevation_mm)
+
+
+class CurvedSurface:
+    """The smooth surface behind the triangles: cubic in position and quadratic in normal inside each of them.
+
+    The vertices of a CAD tessellation lie on the true surface; a local polynomial over the footprint gives normal and
+    curvature there, and curved point-normal triangles carry them over the faces. All arguments and results are in `part`,
+    mm; faces are rows of `surface.faces`, barycentrics (n, 3). Planar regions stay exactly planar.
+    """
+
+    def __init__(self, surface: InspectionSurface, footprint_mm: float) -> None:
+        self.surface = surface
+        self.footprint_mm = float(footprint_mm)
+        self._faces = np.ascontiguousarray(surface.faces, dtype=np.int64)
+        self._vertices = np.ascontiguousarray(surface.vertices)
+        self._welded = weld(self._vertices, weld_tolerance_mm(self._vertices))
+        count = int(self._welded.max()) + 1
+        positions = np.zeros((count, 3))
+        positions[self._welded] = self._vertices
+        self._welded_faces = self._welded[self._faces]
+        fit = fit_vertices(positions, self._welded_faces, self.footprint_mm)
+        self.vertex_fit = VertexFit(*(getattr(fit, n)[self._welded] for n in ("points", "normals", "shape")))
+
+    @cached_property
+    def _tree(self) -> igl.AABB:
+        tree = igl.AABB()
+        tree.init(self._vertices, self._faces)
+        return tree
+
+    @cached_property
+    def _boundary(self) -> tuple[NDArray[np.bool_], NDArray[np.bool_]]:
+        """Faces' edges on the boundary (f, 3), opposite corner k, and faces' corners on it (f, 3)."""
+        edges = edges_of(self._welded_faces)
+        at_edge = edges.is_boundary[edges.of_face]
+        on = np.zeros(int(self._welded.max()) + 1, dtype=bool)
+        on[edges.vertices[edges.is_boundary].ravel()] = True
+        return at_edge, on[self._welded_faces]
+
+    def evaluate(self, face: NDArray, bary: Array) -> tuple[Array, Array]:
+        """Return points (n, 3) and unit outward normals (n, 3) at barycentrics of faces."""
+        corner = self._faces[face]
+        points, normals = self.vertex_fit.points[corner], self.vertex_fit.normals[corner]
+        return pn_points(points, normals, bary), pn_normals(points, normals, bary)
+
+    def normals(self, face: NDArray, bary: Array) -> Array:
+        """Return unit outward normals (n, 3)."""
+        corner = self._faces[face]
+        return pn_normals(self.vertex_fit.points[corner], self.vertex_fit.normals[corner], bary)
+
+    def shape_operator(self, face: NDArray, bary: Array) -> Array:
+        """Return symmetric W (n, 3, 3), 1/mm, with dn = W dp for steps along the surface; a sphere has +1/R."""
+        blended = np.einsum("nk,nkij->nij", bary, self.vertex_fit.shape[self._faces[face]])
+        normal = self.normals(face, bary)
+        into = np.einsum("nij,nj->ni", blended, normal)
+        twice = np.einsum("ni,ni->n", into, normal)
+        mixed = np.einsum("ni,nj->nij", normal, into - 0.5 * twice[:, None] * normal)
+        return np.asarray(blended - mixed - mixed.transpose(0, 2, 1))
+
+    def closest(self, points_part: Array) -> Foot:
+        """Return the feet of points (n, 3): closest on the triangles, then moved until the offset is along the normal."""
+        query = np.ascontiguousarray(points_part, dtype=np.float64).reshape(-1, 3)
+        face, bary = self._on_triangles(query)
+        points, normals = self.evaluate(face, bary)
+        active = np.arange(len(query))
+        for _ in range(FOOT_STEPS):
+            step = self._foot_step(query[active], face[active], bary[active], points[active], normals[active])
+            far = np.linalg.norm(step, axis=1) > FOOT_TOLERANCE_MM
+            active, step = active[far], step[far]
+            if not len(active):
+                break
+            face[active], bary[active] = self._on_triangles(points[active] + step)
+            points[active], normals[active] = self.evaluate(face[active], bary[active])
+        return self._foot(query, face, bary, points, normals)
+
+    def _on_triangles(self, query: Array) -> tuple[NDArray[np.int32], Array]:
+        _, face, at = self._tree.squared_distance(self._vertices, self._faces, query)
+        return face.astype(np.int32), self._barycentric(face, at)
+
+    def _barycentric(self, face: NDArray, at: Array) -> Array:
+        a, b, c = (self._vertices[self._faces[face, k]] for k in range(3))
+        u, v, w = b - a, c - a, at - a
+        uu, uv, vv, wu, wv = (np.einsum("ij,ij->i", p, q) for p, q in ((u, u), (u, v), (v, v), (w, u), (w, v)))
+        det = uu * vv - uv * uv
+        det = np.where(det > 0, det, 1.0)
+        bary = np.stack([np.zeros_like(det), (vv * wu - uv * wv) / det, (uu * wv - uv * wu) / det], axis=1)
+        bary[:, 0] = 1.0 - bary[:, 1] - bary[:, 2]
+        bary = np.clip(bary, 0.0, 1.0)
+        return np.asarray(bary / bary.sum(axis=1, keepdims=True))
+
+    def _foot_step(self, query: Array, face: NDArray, bary: Array, points: Array, normals: Array) -> Array:
+        """Return the Newton step (n, 3) along the surface that makes query - foot parallel to the normal."""
+        offset = query - points
+        height = np.einsum("ij,ij->i", offset, normals)
+        along = offset - height[:, None] * normals
+        system = np.eye(3) + height[:, None, None] * self.shape_operator(face, bary)
+        # Near a centre of curvature the system is singular; there a plain projection is the cautious step.
+        safe = np.linalg.eigvalsh(system)[:, 0] > 0.2
+        step = along.copy()
+        step[safe] = np.linalg.solve(system[safe], along[safe][..., None])[..., 0]
+        return step
+
+    def _foot(self, query: Array, face: NDArray, bary: Array, points: Array, normals: Array) -> Foot:
+        offset = query - points
+        height = np.einsum("ij,ij->i", offset, normals)
+        length = np.linalg.norm(offset, axis=1)
+        along = np.sqrt(np.maximum(length**2 - height**2, 0.0))
+        at_edge, at_corner = self._boundary
+        out = ((bary < 1e-9) & at_edge[face]).any(axis=1) | ((bary > 1 - 1e-9) & at_corner[face]).any(axis=1)
+        beside = out & (along > 1e-3 + 1e-3 * np.abs(height))
+        distance = np.where(beside, np.where(height < 0, -length, length), height)
+        return Foot(points, normals, distance, face, bary, ~beside)
+
+    def raycast(self, origins: Array, directions: Array) -> tuple[NDArray[np.int32], Array, Array]:
+        """Return face (n,), barycentrics (n, 3) and distance t (n,) where rays first meet the surface; face -1, t inf: miss.
+
+        The hit on the triangles is moved onto the smooth surface. Directions need not be unit; t is in their lengths.
+        """
+        origins = np.ascontiguousarray(origins, dtype=np.float64).reshape(-1, 3)
+        directions = np.ascontiguousarray(directions, dtype=np.float64).reshape(-1, 3)
+        face = self._scene.cast(origins, directions)
+        hit = np.flatnonzero(face >= 0)
+        bary, t = np.zeros((len(face), 3)), np.full(len(face), np.inf)
+        if not len(hit):
+            return face, bary, t
+        o, d, f = origins[hit], directions[hit], face[hit]
+        plane = self.surface.face_normals[f]
+        reach = np.einsum("ij,ij->i", self._vertices[self._faces[f, 0]] - o, plane) / np.einsum("ij,ij->i", d, plane)
+        b = self._barycentric(f, o + reach[:, None] * d)
+        for _ in range(2):
+            p, n = self.evaluate(f, b)
+            reach = np.einsum("ij,ij->i", p - o, n) / np.einsum("ij,ij->i", d, n)
+            f, b = self._on_triangles(o + reach[:, None] * d)
+        face[hit], bary[hit], t[hit] = f, b, reach
+        return face, bary, t
+
+    @cached_property
+    def _scene(self) -> Scene:
+        return Scene(self._vertices, self._faces)
+
+    @cached_property
+    def _chord(self) -> tuple[float, float]:
+        face = np.repeat(np.arange(len(self._faces), dtype=np.int32), 4)
+        probe = np.vstack([np.full((1, 3), 1 / 3), 0.5 * (1.0 - np.eye(3))])
+        bary = np.tile(probe, (len(self._faces), 1))
+        points, _ = self.evaluate(face, bary)
+        flat = self.surface.face_normals[face]
+        flat_points = np.einsum("nk,nkj->nj", bary, self._vertices[self._faces[face]])
+        gap = np.abs(np.einsum("ij,ij->i", points - flat_points, flat))
+        at_corners = self.vertex_fit.normals[self._faces]
+        sine = np.linalg.norm(np.cross(at_corners, self.surface.face_normals[:, None]), axis=2)
+        return float(gap.max(initial=0.0)), float(np.degrees(np.arcsin(np.clip(sine, 0, 1).max(initial=0.0))))
+
+    @property
+    def chord_error_mm(self) -> float:
+        """Estimated largest gap between the triangles and the smooth surface (mm)."""
+        return self._chord[0]
+
+    @property
+    def chord_angle_deg(self) -> float:
+        """Estimated largest angle between the triangles' normals and those of the smooth surface (deg)."""
+        return self._chord[1]

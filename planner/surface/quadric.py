@@ -1,0 +1,146 @@
+"""Local polynomials over the tangent plane: the height of the neighbours of every node, by least squares.
+
+The height h(u, v) over the plane through a node is a polynomial of degree 2 (or 3, where the mesh is coarser than the
+footprint and its vertices are exact). Unlike an average of facet normals, its slope at the node does not lean at an edge
+or a hole, because the curvature is estimated along with it.
+"""
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.sparse import csr_array, eye_array
+
+from planner.frames import Array
+from planner.surface.normals import tangent_frames
+
+# A polynomial that few neighbours leave open takes the smallest coefficients: relative to the trace of its equations.
+RIDGE = np.array([1e-12, 1e-12, 1e-12, 1e-9, 1e-9, 1e-9, 1e-6, 1e-6, 1e-6, 1e-6])
+# Neighbours turned by more than about this (rad) count little: a quadric does not describe a fillet end to end.
+TURN = 0.35
+CHUNK_PAIRS = 400_000
+
+
+@dataclass(frozen=True, eq=False)
+class LocalFit:
+    """Polynomials of n nodes: h = sum of coefficients (n, 10) times 1, u, v, u2, uv, v2, u3, u2v, uv2, v3 (mm), over the
+    frames first, second, normal (n, 3) at the nodes' origin. slope_rms (n,): weighted rms of (residual / distance), rad.
+    """
+
+    origin: Array
+    first: Array
+    second: Array
+    normal: Array
+    coefficients: Array
+    slope_rms: Array
+
+
+def two_rings(graph: csr_array) -> csr_array:
+    """Return the adjacency of nodes at most two edges apart, the node itself included."""
+    near = (graph + eye_array(graph.shape[0], dtype=np.int8, format="csr")).tocsr()
+    near.data = np.ones(len(near.data), dtype=np.float32)
+    rings = (near @ near).tocsr()
+    rings.sort_indices()
+    return rings
+
+
+def monomials(u: Array, v: Array, terms: int) -> Array:
+    """Return 1, u, v, u2, uv, v2 (and u3, u2v, uv2, v3) as rows, (terms, n)."""
+    rows = [np.ones_like(u), u, v, u * u, u * v, v * v]
+    if terms == 10:
+        rows += [rows[3] * u, rows[3] * v, u * rows[5], v * rows[5]]
+    return np.stack(rows)
+
+
+def fit_nodes(
+    mean: Array, spread: Array, count: Array, normals: Array, rings: csr_array, nodes: NDArray[np.int64], exact: bool
+) -> LocalFit:
+    """Return the local polynomials of `nodes` (n,) over their `rings`.
+
+    mean (c, 3), spread (c, 6), count (c,), normals (c, 3): clusters. exact: the nodes are points of the true surface, so
+    a cubic goes through them; else a quadric is fitted and the node's own noise is averaged with its neighbours'.
+    """
+    pieces = []
+    sizes = np.diff(rings.indptr)[nodes]
+    bounds = np.searchsorted(np.cumsum(sizes), np.arange(CHUNK_PAIRS, int(sizes.sum()) + CHUNK_PAIRS, CHUNK_PAIRS))
+    start = 0
+    for stop in np.unique(np.r_[np.minimum(bounds + 1, len(nodes)), len(nodes)]):
+        pieces.append(_fit(mean, spread, count, normals, rings, nodes[start:stop], exact))
+        start = int(stop)
+    names = LocalFit.__dataclass_fields__
+    return LocalFit(*(np.concatenate([getattr(p, name) for p in pieces]) for name in names))
+
+
+def _pairs(rings: csr_array, nodes: NDArray[np.int64]) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
+    sizes = np.diff(rings.indptr)[nodes]
+    starts = np.r_[0, np.cumsum(sizes)[:-1]]
+    within = np.arange(int(sizes.sum())) - np.repeat(starts, sizes)
+    return np.asarray(rings.indices[np.repeat(rings.indptr[nodes], sizes) + within], dtype=np.int64), starts
+
+
+def _fit(
+    mean: Array, spread: Array, count: Array, normals: Array, rings: csr_array, nodes: NDArray[np.int64], exact: bool
+) -> LocalFit:
+    other, starts = _pairs(rings, nodes)
+    sizes = np.diff(np.r_[starts, len(other)])
+    row = np.repeat(np.arange(len(nodes)), sizes)
+    normal = normals[nodes]
+    first, second = tangent_frames(normal)
+    d = mean[other] - mean[nodes[row]]
+    f, s, m = first[row], second[row], normal[row]
+    u, v, h = (np.einsum("ij,ij->i", d, axis) for axis in (f, s, m))
+    distance = np.sqrt(u * u + v * v + h * h)
+    scale = np.maximum.reduceat(distance, starts)
+    scale[scale == 0] = 1.0
+    k = scale[row]
+    rho = distance / k
+    turn2 = 2.0 * (1.0 - np.einsum("ij,ij->i", normals[other], m))
+    one_ring = np.minimum.reduceat(np.where(rho > 0, rho, 1.0), starts)[row]
+    if exact:
+        weight = 1.0 / (rho + 0.3 * one_ring) ** 4 * np.exp(-turn2 / (2.0 * TURN) ** 2)
+    else:
+        weight = count[other] * (1.05 - rho * rho) ** 2 * np.exp(-turn2 / TURN**2)
+    terms = 10 if exact else 6
+    phi = monomials(u / k, v / k, terms)
+    if not exact and spread.any():
+        phi[3] += _quadratic(spread[other], f, f) / k**2
+        phi[4] += _quadratic(spread[other], f, s) / k**2
+        phi[5] += _quadratic(spread[other], s, s) / k**2
+    if exact:
+        phi[0] = 0.0
+    coefficients = _solve(phi, h / k, weight, starts)
+    residual = h / k - np.einsum("tn,nt->n", phi, coefficients[row])
+    far = rho > 0
+    slope2 = np.add.reduceat(np.where(far, weight * residual**2 / np.where(far, rho * rho, 1.0), 0.0), starts)
+    slope_rms = np.sqrt(slope2 / np.add.reduceat(np.where(far, weight, 1e-300), starts))
+    full = np.zeros((len(nodes), 10))
+    powers = np.array([0, 1, 1, 2, 2, 2, 3, 3, 3, 3])[:terms]
+    full[:, :terms] = coefficients * scale[:, None] ** (1.0 - powers)
+    return LocalFit(mean[nodes], first, second, normal, full, slope_rms)
+
+
+def _quadratic(tensor: Array, a: Array, b: Array) -> Array:
+    """Return a . S . b of symmetric tensors (n, 6) in the order xx, yy, zz, xy, xz, yz."""
+    xx, yy, zz, xy, xz, yz = tensor.T
+    return np.asarray(
+        a[:, 0] * (xx * b[:, 0] + xy * b[:, 1] + xz * b[:, 2])
+        + a[:, 1] * (xy * b[:, 0] + yy * b[:, 1] + yz * b[:, 2])
+        + a[:, 2] * (xz * b[:, 0] + yz * b[:, 1] + zz * b[:, 2])
+    )
+
+
+def _solve(phi: Array, h: Array, weight: Array, starts: NDArray[np.int64]) -> Array:
+    """Return weighted least-squares coefficients (n, terms) of segments that begin at `starts`."""
+    terms = len(phi)
+    matrix = np.zeros((len(starts), terms, terms))
+    right = np.zeros((len(starts), terms))
+    for i in range(terms):
+        weighted = weight * phi[i]
+        right[:, i] = np.add.reduceat(weighted * h, starts)
+        for j in range(i, terms):
+            matrix[:, i, j] = np.add.reduceat(weighted * phi[j], starts)
+            matrix[:, j, i] = matrix[:, i, j]
+    trace = np.einsum("nii->n", matrix) / terms
+    diagonal = np.arange(terms)
+    matrix[:, diagonal, diagonal] += RIDGE[:terms] * np.maximum(trace, 1e-30)[:, None]
+    return np.asarray(np.linalg.solve(matrix, right[..., None])[..., 0])
