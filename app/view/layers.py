@@ -1,0 +1,47 @@
+"""The layers of the view: where each hangs in the tree of frames, and which a step shows."""
+
+from dataclasses import dataclass
+
+
+@dataclass(frozen=True)
+class Layer:
+    """A group of nodes switched as one. node: its name in the tree, which mirrors the frames. title: for people."""
+
+    node: str
+    title: str
+
+
+LAYERS: dict[str, Layer] = {
+    "axes": Layer("/base/axes", "Frames"),
+    "cad": Layer("/base/partnom/cad", "Part (CAD)"),
+    "surface": Layer("/base/partnom/surface", "Inspection surface"),
+    "coverage": Layer("/base/partnom/coverage", "Coverage of the alignment scan"),
+    "keypoints": Layer("/base/partnom/keypoints", "Key points"),
+    "alignment": Layer("/base/partnom/alignment", "Alignment path"),
+    "inspection": Layer("/base/partnom/inspection", "Inspection raster"),
+    "probe": Layer("/base/partnom/probe", "Probe"),
+    "scan": Layer("/base/scan", "Scan points"),
+    "before": Layer("/base/partnom/deviation", "Deviation before"),
+    "found": Layer("/base/part/cad", "Part as found"),
+    "after": Layer("/base/part/deviation", "Deviation after"),
+    "corrected": Layer("/base/part/corrected", "Corrected raster"),
+}
+
+STEPS: dict[str, tuple[str, ...]] = {
+    "part": ("axes", "cad"),
+    "cell": ("axes", "cad"),
+    "surface": ("cad", "surface"),
+    "keypoints": ("cad", "surface", "coverage", "keypoints"),
+    "paths": ("cad", "inspection", "keypoints", "probe"),
+    "programs": ("cad", "alignment", "keypoints"),
+    "scan": ("cad", "keypoints", "scan"),
+    "alignment": ("cad", "keypoints", "after"),
+    "report": ("found", "after"),
+}
+
+FRAMES = ("/base", "/base/partnom", "/base/part")
+
+
+def layers_of(step: str) -> frozenset[str]:
+    """Return the layers a step shows."""
+    return frozenset(STEPS.get(step, STEPS["part"]))
