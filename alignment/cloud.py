@@ -17,7 +17,8 @@ class PointCloud:
     distance to the surface (perpendicular, for the ultrasonic point model). A cloud of ready surface points (laser) has
     `origins_base` on the surface, distance 0 and beams None. arrays_base (n, 3): direction of the array axis (TCP x) or
     None. amplitude_pct (n,): NaN if unknown. law, pose_index, pass_id, scan_id (n,): where the reading came from
-    (pose_index counts over all scans, in order of time); lost echoes are kept in `lost_*`, since an edge shows in them.
+    (pose_index and pass_id count over all scans, in order of time). law is 1 for ready surface points. Lost echoes are kept
+    in `lost_*` (l,), since an edge shows in them: `lost_origins_base`, `lost_beams_base` (l, 3).
     """
 
     origins_base: Array
@@ -32,6 +33,8 @@ class PointCloud:
     lost_origins_base: Array = field(default_factory=lambda: np.zeros((0, 3)))
     lost_pose_index: NDArray[np.int32] = field(default_factory=lambda: np.zeros(0, dtype=np.int32))
     lost_law: NDArray[np.int32] = field(default_factory=lambda: np.zeros(0, dtype=np.int32))
+    lost_beams_base: Array = field(default_factory=lambda: np.zeros((0, 3)))
+    lost_pass_id: NDArray[np.int32] = field(default_factory=lambda: np.zeros(0, dtype=np.int32))
     total_readings: int = 0
     issues: tuple[Issue, ...] = ()
 

@@ -1,0 +1,115 @@
+"""Readings, poses, echoes or points from CSV text (`.csv`, `.csv.gz`, `.xyz` with a header). Runs inside the sandbox."""
+
+import csv
+import gzip
+from pathlib import Path
+from typing import Any
+
+import polars as pl
+
+from alignment.readers.columns import Layout, layout
+from alignment.readers.tables import payload
+from planner.errors import EchoBaseError, fail
+
+HEADER_BYTES = 65_536
+
+
+def parse_csv(source: Path, name: str) -> dict[str, Any]:
+    """Return the payload (see `tables.payload`) of a comma-separated file with a header line."""
+    header_line, skip = _header(source, name)
+    columns = next(csv.reader([header_line]))
+    found = layout([column for column in columns if column.strip()], name)
+    return payload(found, _columns(source, name, columns, found, skip), name)
+
+
+def _header(source: Path, name: str) -> tuple[str, int]:
+    """Return the header line and the number of lines before it (comments, blank lines)."""
+    with source.open("rb") as raw:
+        gzipped = raw.read(2) == b"\x1f\x8b"
+    opened = gzip.open(source, "rb") if gzipped else source.open("rb")
+    try:
+        with opened as stream:
+            head = stream.read(HEADER_BYTES)
+    except (OSError, EOFError) as error:
+        raise fail("scan-unreadable", f"the compressed file is damaged ({error}).", "Copy it again.", name) from error
+    if head.startswith((b"\xff\xfe", b"\xfe\xff")):
+        raise fail("csv-encoding", "the text is UTF-16.", "Save it as UTF-8 CSV.", name)
+    text = head.decode("utf-8-sig", errors="replace")
+    lines = text.splitlines()
+    for number, line in enumerate(lines):
+        if line.strip() and not line.lstrip().startswith("#"):
+            _check_separators(line, lines[number + 1] if number + 1 < len(lines) else "", name)
+            return line, number
+    raise fail("scan-empty", "the file is empty.", "Export the scan again with one header line and its readings.", name)
+
+
+def _check_separators(header: str, first_row: str, name: str) -> None:
+    for separator, word in ((";", "semicolons"), ("\t", "tabs")):
+        if header.count(separator) > header.count(","):
+            comma = " and a decimal comma" if "," in first_row else ""
+            raise fail(
+                "csv-separator",
+                f"the columns are separated by {word}{comma}.",
+                "Save the file with commas between the columns and a decimal point.",
+                name,
+            )
+    if "," in header and first_row.count(",") == 2 * header.count(",") + 1:
+        raise fail(
+            "csv-decimal-comma",
+            "the first row has twice as many cells as the header: the numbers use a decimal comma.",
+            "Save the file with a decimal point.",
+            name,
+        )
+
+
+def _columns(source: Path, name: str, columns: list[str], found: Layout, skip: int) -> dict[str, Any]:
+    wanted = list(found.spelled.values())
+    options: dict[str, Any] = {
+        "columns": wanted,
+        "skip_lines": skip,
+        "comment_prefix": "#",
+        "encoding": "utf8",
+    }
+    try:
+        frame = pl.read_csv(source, schema_overrides=dict.fromkeys(wanted, pl.Float64), **options)
+    except pl.exceptions.NoDataError as error:
+        raise fail("scan-empty", "the file has a header but no readings.", "Export the scan again.", name) from error
+    except pl.exceptions.PolarsError as error:
+        raise _cell_error(source, name, wanted, options, skip, error) from error
+    return {key: frame.get_column(spelled) for key, spelled in found.spelled.items()}
+
+
+def _cell_error(
+    source: Path, name: str, wanted: list[str], options: dict[str, Any], skip: int, error: Exception
+) -> EchoBaseError:
+    """Find the first cell that is not a number (read again as text), for the message."""
+    try:
+        text = pl.read_csv(
+            source, schema_overrides=dict.fromkeys(wanted, pl.String), truncate_ragged_lines=True, **options
+        )
+    except pl.exceptions.PolarsError:
+        reason = str(error).splitlines()[0]
+        return fail(
+            "csv-malformed", f"the table cannot be read ({reason}).", "Every row needs one cell per column.", name
+        )
+    worst: tuple[int, str, str] | None = None
+    for column in wanted:
+        cells = text.get_column(column).str.strip_chars()
+        bad = (cells != "") & cells.is_not_null() & cells.cast(pl.Float64, strict=False).is_null()
+        row = bad.arg_max() if bool(bad.any()) else None
+        if row is not None and (worst is None or row < worst[0]):
+            worst = (int(row), column, str(cells[row]))
+    if worst is None:
+        return fail(
+            "csv-malformed",
+            "rows have more or fewer cells than the header.",
+            "Every row needs one cell per column; look for text with commas in it.",
+            name,
+        )
+    row, column, cell = worst
+    return fail(
+        "cell-not-a-number",
+        f"row {row + skip + 2}, column '{column.strip()}': '{cell[:40]}' is not a number.",
+        "Write a number with a decimal point, or leave the cell empty where the echo was lost.",
+        name,
+    )
