@@ -1,19 +1,25 @@
 """The edges of the inspection surface: closed curves, what lies beyond them, and the distance to them."""
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from enum import IntEnum
 
+import igl
 import numpy as np
+import potpourri3d
 from numpy.typing import NDArray
 
 from planner.frames import Array
 from planner.surface.inspection import InspectionSurface
+from planner.surface.loops import successors
 from planner.surface.normals import unit
 from planner.surface.select import welded_faces
-from planner.surface.topology import Index, edges_of
+from planner.surface.topology import Index, edges_of, weld, weld_tolerance_mm
 
 # Faces of the part that continue within this of flat are neither up nor down: the part goes on (a chosen limit, say).
 LEVEL_DEG = 1.0
+# First-order marching over irregular triangles is at most this much too long.
+MARCH_ERROR = 0.03
 
 
 class EdgeKind(IntEnum):
@@ -64,7 +70,7 @@ def boundary(surface: InspectionSurface) -> tuple[BoundaryCurve, ...]:
     if not len(face):
         return ()
     start, end = faces[face, (corner + 1) % 3], faces[face, (corner + 2) % 3]
-    follow = _successors(faces, edges.of_face, edges.is_boundary, face, corner)
+    follow = successors(faces, edges.of_face, edges.is_boundary, face, corner)
     original = surface.faces[face, (corner + 1) % 3].astype(np.int64)
     kinds = _kinds(surface, start, end, face)
     seen = np.zeros(len(face), dtype=bool)
@@ -81,46 +87,6 @@ def boundary(surface: InspectionSurface) -> tuple[BoundaryCurve, ...]:
         curves.append(_curve(surface, np.array(loop), face, original, kinds))
     curves.sort(key=lambda c: -c.length_mm)
     return tuple(curves)
-
-
-def _successors(faces: Index, of_face: Index, is_boundary: NDArray[np.bool_], face: Index, corner: Index) -> Index:
-    """Return for every boundary half-edge (face, corner opposite) the next one around the surface (m,)."""
-    number = np.full(faces.shape, -1)
-    number[face, corner] = np.arange(len(face))
-    # Turn about the end vertex through neighbouring faces until the next boundary edge.
-    other_face = _across(of_face)
-    f, e = face.copy(), (corner + 1) % 3  # the edge that leaves the end vertex within the same face
-    result = np.full(len(face), -1)
-    pivot = faces[face, (corner + 2) % 3]
-    active = np.arange(len(face))
-    for _ in range(len(faces) + 1):
-        done = is_boundary[of_face[f, e]]
-        result[active[done]] = number[f[done], e[done]]
-        active, f, e, pivot = active[~done], f[~done], e[~done], pivot[~done]
-        if not len(active):
-            break
-        g = other_face[f, e]
-        stuck = g < 0  # a non-manifold edge: the curve ends here and is closed by a straight segment
-        active, f, g, e, pivot = active[~stuck], f[~stuck], g[~stuck], e[~stuck], pivot[~stuck]
-        at = np.argmax(faces[g] == pivot[:, None], axis=1)
-        # In face g the edge that leaves the pivot is from corner `at` to `at + 1`: it lies opposite corner `at + 2`.
-        f, e = g, (at + 2) % 3
-    lost = result < 0
-    result[lost] = np.flatnonzero(lost)
-    return result
-
-
-def _across(of_face: Index) -> Index:
-    """Return for every face and edge the other face at the edge (f, 3); -1 where there is not exactly one."""
-    flat = of_face.ravel()
-    order = np.argsort(flat, kind="stable")
-    ordered = flat[order]
-    across = np.full(len(flat), -1)
-    same = np.flatnonzero(ordered[1:] == ordered[:-1])
-    across[order[same]], across[order[same + 1]] = order[same + 1] // 3, order[same] // 3
-    counts = np.bincount(flat)
-    across[counts[flat] != 2] = -1
-    return across.reshape(-1, 3)
 
 
 def _kinds(surface: InspectionSurface, start: Index, end: Index, face: Index) -> NDArray[np.uint8]:
@@ -177,3 +143,62 @@ def _is_outer(surface: InspectionSurface, points: Array, face: Index) -> bool:
     centre = points.mean(axis=0)
     area = 0.5 * np.cross(points - centre, closed - centre).sum(axis=0)
     return bool(area @ normal > 0.0)
+
+
+def edge_distance_mm(curves: Sequence[BoundaryCurve], points_part: Array) -> Array:
+    """Return the straight distance of points (n, 3) to the nearest segment of the boundary (n,), mm; inf without one.
+
+    On a smooth surface it is short of the distance along the surface by d^3 / (24 R^2): 0.02 mm at 10 mm and R 50 mm.
+    """
+    points = np.ascontiguousarray(points_part, dtype=np.float64).reshape(-1, 3)
+    if not curves:
+        return np.full(len(points), np.inf)
+    vertices = np.concatenate([c.points for c in curves])
+    first = np.cumsum([0] + [len(c) for c in curves])[:-1]
+    segments = np.concatenate(
+        [
+            start + np.stack([np.arange(len(c)), np.roll(np.arange(len(c)), -1)], axis=1)
+            for c, start in zip(curves, first, strict=True)
+        ]
+    )
+    squared, _, _ = igl.point_mesh_squared_distance(points, vertices, segments.astype(np.int64))
+    return np.sqrt(np.asarray(squared).reshape(-1))
+
+
+def distance_to_boundary(surface: InspectionSurface) -> Array:
+    """Return the distance along the surface from every vertex to the boundary (v,), mm; inf for a closed body.
+
+    Fast marching over the triangles (Kimmel and Sethian 1998, doi:10.1073/pnas.95.15.8431) from the vertices next to the
+    boundary, which start at their straight distance to its segments; never below the straight distance, and longer only by
+    what exceeds the error of marching (3 %), so that margins err on the side of the part. Of a coarse mesh, whose vertices
+    all lie on the boundary, ask `edge_distance_mm` at the points that matter instead.
+    """
+    curves = boundary(surface)
+    straight = edge_distance_mm(curves, surface.vertices)
+    if not curves:
+        return straight
+    label = weld(surface.vertices, weld_tolerance_mm(surface.vertices))
+    vertices = np.zeros((int(label.max()) + 1, 3))
+    vertices[label] = surface.vertices
+    near = np.full(len(vertices), np.inf)
+    np.minimum.at(near, label, straight)
+    faces = label[surface.faces]
+    faces = faces[(faces[:, 0] != faces[:, 1]) & (faces[:, 1] != faces[:, 2]) & (faces[:, 2] != faces[:, 0])]
+    edges = edges_of(faces)
+    on = np.zeros(len(vertices), dtype=bool)
+    on[edges.vertices[edges.is_boundary].ravel()] = True
+    start = np.unique(faces[on[faces].any(axis=1)])
+    marched = _march(vertices, faces, start, near[start])
+    # What marching adds over the straight line counts only beyond its own error on irregular triangles.
+    detour = np.maximum(marched - near - (MARCH_ERROR * near + np.median(near[start])), 0.0)
+    return np.asarray((near + detour)[label])
+
+
+def _march(vertices: Array, faces: Array, start: Array, distances: Array) -> Array:
+    used, compact = np.unique(faces, return_inverse=True)
+    solver = potpourri3d.MeshFastMarchingDistanceSolver(vertices[used], compact.reshape(-1, 3))
+    row = np.searchsorted(used, start)
+    curves = [[(int(v), [])] for v in row]
+    result = np.full(len(vertices), np.inf)
+    result[used] = solver.compute_distance(curves, [[float(d)] for d in distances])
+    return result
