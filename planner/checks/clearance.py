@@ -17,7 +17,10 @@ NEAR_MM = 2.0
 # Sample spacing on the cylinder as a share of its radius.
 SAMPLE_SHARE = 0.25
 # Centres of the enclosing spheres behind the TCP, in nozzle lengths; from half a length on they hold the whole nozzle.
-SPHERE_LENGTHS = (4.0, 2.0, 1.0, 0.5)
+# The near ones are cheap to ask and fit into hollows; the far ones prove small standoffs on flat and convex parts.
+SPHERE_LENGTHS = (0.5, 1.0, 2.0, 4.0)
+# The wrist is far from the part and asking far is slow: it is asked again after this much motion (mm), or when near.
+WRIST_STRIDE_MM = 40.0
 
 
 @dataclass(frozen=True)
@@ -44,9 +47,10 @@ class Envelope:
 def clearance_mm(solid: Solid, Ts_part_tcp: Transform, envelope: Envelope) -> tuple[Array, Array]:
     """Return the clearance of nozzle and of wrist (n,) each, mm, at n TCP poses.
 
-    The nozzle's is a lower bound (a few tenths below the truth on flat and convex parts); below `NEAR_MM` it is the
-    distance of the nearest part points found from the cylinder, negative by their depth inside it. The wrist's is exact.
-    Without a nozzle or a wrist it is infinite. Poses with the TCP in the material have the nozzle's depth, negative.
+    The nozzle's is a lower bound (on a flat part by up to radius^2 / length below the truth); below `NEAR_MM` it is the
+    distance of the nearest part points found from the cylinder, negative by their depth inside it. The wrist's is a
+    lower bound too, up to `WRIST_STRIDE_MM` below the truth, and exact where it is less than that. Without a nozzle or a
+    wrist it is infinite. Poses with the TCP in the material have the nozzle's depth, negative.
     """
     origin, beam = Ts_part_tcp.xyz_mm, Ts_part_tcp.rotation_matrix[:, :, 2]
     nozzle = np.full(len(origin), np.inf)
@@ -54,12 +58,25 @@ def clearance_mm(solid: Solid, Ts_part_tcp: Transform, envelope: Envelope) -> tu
         nozzle = _nozzle(solid, Ts_part_tcp, origin, beam, envelope)
     wrist = np.full(len(origin), np.inf)
     if envelope.wrist_tcp is not None:
-        wrist = solid.distance_mm(Ts_part_tcp.points(np.tile(envelope.wrist_tcp, (len(origin), 1))))
-        wrist -= envelope.wrist_radius_mm
+        centres = Ts_part_tcp.points(np.tile(envelope.wrist_tcp, (len(origin), 1)))
+        wrist = _strided_distance_mm(solid, centres, envelope.wrist_radius_mm) - envelope.wrist_radius_mm
     buried = solid.inside(origin)
     if buried.any():
         nozzle[buried] = -solid.distance_mm(origin[buried])
     return nozzle, wrist
+
+
+def _strided_distance_mm(solid: Solid, centres: Array, radius: float) -> Array:
+    """Return a lower bound (n,), mm, of the distances of points on a way: no point is nearer by more than it moved."""
+    if len(centres) == 0:
+        return np.zeros(0)
+    along = np.r_[0.0, np.cumsum(np.linalg.norm(np.diff(centres, axis=0), axis=1))]
+    _, anchor, back = np.unique(np.floor(along / WRIST_STRIDE_MM), return_index=True, return_inverse=True)
+    moved = np.linalg.norm(centres - centres[anchor][back], axis=1)
+    distance = solid.distance_mm(centres[anchor])[back] - moved
+    near = (distance - radius < WRIST_STRIDE_MM) & (moved > 0.0)
+    distance[near] = solid.distance_mm(centres[near])
+    return distance
 
 
 def _nozzle(solid: Solid, poses: Transform, origin: Array, beam: Array, envelope: Envelope) -> Array:
