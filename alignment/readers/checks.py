@@ -5,9 +5,9 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from alignment.readers.arrays import Array
 from alignment.readers.columns import POSE
 from planner.errors import fail
-from planner.frames import Array
 
 # Two-way times through water lie between 1.4 us (1 mm) and 1,400 us (1 m): a median far outside is another unit.
 LEAST_TOF_US, MOST_TOF_US = 0.3, 3_000.0

@@ -26,9 +26,8 @@ def _header(source: Path, name: str) -> tuple[str, int]:
     """Return the header line and the number of lines before it (comments, blank lines)."""
     with source.open("rb") as raw:
         gzipped = raw.read(2) == b"\x1f\x8b"
-    opened = gzip.open(source, "rb") if gzipped else source.open("rb")
     try:
-        with opened as stream:
+        with gzip.open(source, "rb") if gzipped else source.open("rb") as stream:
             head = stream.read(HEADER_BYTES)
     except (OSError, EOFError) as error:
         raise fail("scan-unreadable", f"the compressed file is damaged ({error}).", "Copy it again.", name) from error
@@ -67,11 +66,16 @@ def _columns(source: Path, name: str, columns: list[str], found: Layout, skip: i
     options: dict[str, Any] = {
         "columns": wanted,
         "skip_lines": skip,
-        "comment_prefix": "#",
         "encoding": "utf8",
     }
+    numbers = dict.fromkeys(wanted, pl.Float64)
     try:
-        frame = pl.read_csv(source, schema_overrides=dict.fromkeys(wanted, pl.Float64), **options)
+        try:
+            frame = pl.read_csv(source, schema_overrides=numbers, **options)
+        except pl.exceptions.ComputeError:
+            # Comments between the rows are rare, and looking for them takes as long as reading.
+            options["comment_prefix"] = "#"
+            frame = pl.read_csv(source, schema_overrides=numbers, **options)
     except pl.exceptions.NoDataError as error:
         raise fail("scan-empty", "the file has a header but no readings.", "Export the scan again.", name) from error
     except pl.exceptions.PolarsError as error:

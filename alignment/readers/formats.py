@@ -4,12 +4,12 @@ from pathlib import Path
 
 from planner.errors import fail
 
-CSV = "alignment.readers.delimited:parse_csv"
-PARQUET = "alignment.readers.columnar:parse_parquet"
-HDF5 = "alignment.readers.hdf5:parse_hdf5"
-PLY = "alignment.readers.ply:parse_ply"
-PCD = "alignment.readers.pcd:parse_pcd"
-XYZ = "alignment.readers.xyz:parse_xyz"
+CSV = "delimited:parse_csv"
+PARQUET = "columnar:parse_parquet"
+HDF5 = "hdf5:parse_hdf5"
+PLY = "ply:parse_ply"
+PCD = "pcd:parse_pcd"
+XYZ = "xyz:parse_xyz"
 
 BY_SUFFIX = {
     ".csv": CSV,
@@ -36,7 +36,7 @@ BY_MAGIC = (
 
 
 def parser_of(path: Path, name: str) -> str:
-    """Return `"package.module:function"` of the parser for a file; fail if the format is unknown."""
+    """Return `"module:function"` of the parser, a module of this package, for a file; fail if the format is unknown."""
     lower = name.lower()
     for suffix in sorted(BY_SUFFIX, key=len, reverse=True):
         if lower.endswith(suffix):

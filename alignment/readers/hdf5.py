@@ -7,9 +7,9 @@ import h5py
 import numpy as np
 
 from alignment.readers import checks
+from alignment.readers.arrays import Array
 from alignment.readers.columns import BASE
 from planner.errors import fail
-from planner.frames import Array
 from planner.issues import Issue
 
 KNOWN = {"poses", "tof_us", "amplitude_pct", "t_s", "pass", *BASE}

@@ -2,6 +2,7 @@
 
 import hashlib
 from collections.abc import Sequence
+from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
 from typing import Any
 
@@ -11,21 +12,11 @@ from alignment.scan import Scan, SurfacePoints
 from planner.errors import fail
 from planner.frames import Transform
 from planner.issues import Issue
-
-try:
-    from planner.sandbox import Limits, run_limited
-except ImportError:  # until the sandbox is there
-    import importlib
-
-    Limits = Any  # type: ignore[misc,assignment]
-
-    def run_limited(target: str, source: Path, options: dict[str, Any], limits: Any = None) -> Any:  # type: ignore[misc]
-        module, _, function = target.partition(":")
-        return getattr(importlib.import_module(module), function)(source, **options)
+from planner.sandbox import SandboxLimits, run_limited
 
 
 def read_scan(
-    sources: Sequence[Path], names: Sequence[str] | None = None, limits: Limits | None = None
+    sources: Sequence[Path], names: Sequence[str] | None = None, limits: SandboxLimits | None = None
 ) -> Scan | SurfacePoints:
     """Return the scan in one file, or in a pair of files (poses and echoes, merged by time).
 
@@ -37,8 +28,10 @@ def read_scan(
         raise ValueError(f"{len(sources)} files but {len(labels)} names")
     if not 1 <= len(sources) <= 2:
         raise fail("scan-files", f"{len(sources)} files given.", "A scan is one file, or a pair: poses and readings.")
-    parsed = [_parse(path, label, limits) for path, label in zip(sources, labels, strict=True)]
-    name, sha256 = " + ".join(labels), _sha256(sources)
+    with ThreadPoolExecutor(1) as aside:
+        digest = aside.submit(_sha256, sources)
+        parsed = [_parse(path, label, limits) for path, label in zip(sources, labels, strict=True)]
+    name, sha256 = " + ".join(labels), digest.result()
     if len(parsed) == 2:
         return _scan(*_paired(parsed, name), name, sha256)
     payload = parsed[0]
@@ -64,8 +57,10 @@ def read_scan(
     return _scan(payload, Transform.from_xyzabc("scan", "tcp", payload["poses"]), name, sha256)
 
 
-def _parse(path: Path, label: str, limits: Limits | None) -> dict[str, Any]:
-    return run_limited(parser_of(path, label), path, {"name": label}, limits)
+def _parse(path: Path, label: str, limits: SandboxLimits | None) -> dict[str, Any]:
+    options = {"parser": parser_of(path, label), "name": label}
+    arrays, meta = run_limited("alignment.readers.sandboxed:parse", path, options, limits)
+    return meta | arrays
 
 
 def _paired(parsed: list[dict[str, Any]], name: str) -> tuple[dict[str, Any], Transform]:

@@ -16,9 +16,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from alignment.readers import checks
+from alignment.readers.arrays import Array
 from alignment.readers.columns import BASE, POSE, POSITION, Layout
 from planner.errors import fail
-from planner.frames import Array
 
 
 def payload(found: Layout, columns: Mapping[str, Any], name: str) -> dict[str, Any]:
