@@ -1,0 +1,1 @@
+"""Path geometry: rasters, key points, the alignment path, coverage and decimation."""

@@ -1,0 +1,98 @@
+"""Which way to scan: the long axis of a surface, whatever its tessellation."""
+
+from dataclasses import dataclass
+
+import numpy as np
+from scipy.spatial import ConvexHull, QhullError
+
+from planner.errors import fail
+from planner.frames import Array
+from planner.surface.inspection import InspectionSurface
+
+# Below this length of the area-mean of the unit normals a surface closes on itself (a half tube has 0.64).
+_WRAPPED = 0.25
+
+
+@dataclass(frozen=True, eq=False)
+class ScanAxes:
+    """Right-handed axes of a raster in `part`: along the passes, across them, mean outward normal. wrapped: see below."""
+
+    along: Array
+    across: Array
+    normal: Array
+    wrapped: bool
+
+
+def scan_axes(surface: InspectionSurface, direction_deg: float) -> ScanAxes:
+    """Return the axes of the raster: the longest extent, turned by `direction_deg` about the mean normal.
+
+    The longest extent is the long side of the smallest rectangle around the surface seen along its mean normal, so
+    that neither the number nor the place of the triangles matters; a square keeps the part axis nearest to X. A surface
+    that closes on itself (`wrapped`: a tube, a full skin) has no mean normal: its long axis is the principal axis of
+    its area, and the normal is the one square to it with the largest extent.
+    """
+    a = surface.face_areas_mm2
+    total = float(a.sum())
+    if not total > 0.0:
+        raise fail("surface-empty", "The inspection surface has no area.", "Choose another surface.")
+    mean = a @ surface.face_normals / total
+    wrapped = bool(np.linalg.norm(mean) < _WRAPPED)
+    if wrapped:
+        tensor = _area_tensor(surface)
+        _, vectors = np.linalg.eigh(tensor)
+        longest, normal = vectors[:, 2], vectors[:, 1]
+    else:
+        normal = mean / np.linalg.norm(mean)
+        longest = _long_side(surface.vertices, normal)
+    longest = _canonical(longest)
+    turn = np.radians(direction_deg)
+    along = np.cos(turn) * longest + np.sin(turn) * np.cross(normal, longest)
+    along /= np.linalg.norm(along)
+    return ScanAxes(along, np.cross(normal, along), normal, wrapped)
+
+
+def _canonical(v: Array) -> Array:
+    """Return the axis with its largest component positive (the first of equals)."""
+    k = int(np.argmax(np.round(np.abs(v), 9)))
+    return v if v[k] > 0 else -v
+
+
+def _area_tensor(surface: InspectionSurface) -> Array:
+    """Return the exact second moment of the area about its centroid (3, 3)."""
+    tri = surface.vertices[surface.faces] - surface.centroid_part
+    s = tri.sum(axis=1)
+    w = surface.face_areas_mm2 / 12.0
+    return np.asarray(np.einsum("t,tki,tkj->ij", w, tri, tri) + np.einsum("t,ti,tj->ij", w, s, s))
+
+
+def _long_side(vertices: Array, normal: Array) -> Array:
+    """Return the direction of the long side of the smallest rectangle around the vertices seen along `normal`."""
+    e = np.eye(3)[int(np.argmin(np.round(np.abs(normal), 9)))]
+    x = e - normal * (e @ normal)
+    x /= np.linalg.norm(x)
+    y = np.cross(normal, x)
+    flat = np.stack([vertices @ x, vertices @ y], axis=1)
+    try:
+        corner = flat[ConvexHull(flat - flat.mean(axis=0)).vertices]
+    except (QhullError, ValueError):
+        raise fail(
+            "surface-degenerate", "The inspection surface is a line or a point.", "Choose another one."
+        ) from None
+    edge = np.roll(corner, -1, axis=0) - corner
+    u = edge / np.linalg.norm(edge, axis=1, keepdims=True)
+    length = np.ptp(corner @ u.T, axis=0)
+    width = np.ptp(corner @ np.stack([-u[:, 1], u[:, 0]]), axis=0)
+    best = int(np.argmin(np.round(length * width / (length * width).min(), 6)))
+    d, w = u[best], np.array([-u[best, 1], u[best, 0]])
+    if width[best] > length[best] * 1.01:
+        d = w
+    along = d[0] * x + d[1] * y
+    other = np.cross(normal, along)
+    if abs(width[best] / length[best] - 1.0) <= 0.01 and _first_axis(other) > _first_axis(along):
+        along = other
+    return along
+
+
+def _first_axis(v: Array) -> float:
+    """Return how much an axis looks along X, then Y: what decides between the sides of a square."""
+    return float(abs(v[0]) + 1e-3 * abs(v[1]))

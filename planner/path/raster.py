@@ -1,0 +1,147 @@
+"""The inspection raster."""
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.ndimage import maximum_filter1d
+from scipy.signal import savgol_filter
+
+from planner.errors import fail
+from planner.frames import Array
+from planner.path.axes import ScanAxes, scan_axes
+from planner.path.cut import tangent
+from planner.path.links import with_links
+from planner.path.mesh import PathMesh
+from planner.path.order import nearest_order
+from planner.path.passes import DataRuns, assemble, headings
+from planner.path.raster_geodesic import geodesic_cut
+from planner.path.raster_plane import plane_cut
+from planner.path.tracks import Tracks, split_at_turns, tracks
+from planner.setup import Setup
+from planner.surface.curved import CurvedSurface
+from planner.toolpath import ToolPath
+
+MOST_POSES = 5_000_000
+GEOMETRY_SPACING_MM = 5.0
+"""Dense poses stand no farther apart than this, however sparse the acquisition, so that they describe the surface."""
+_SMOOTHING_MM = 10.0
+_SHARP_DEG = 30.0
+
+
+def raster(curved: CurvedSurface, setup: Setup) -> ToolPath:
+    """Return the dense inspection path (kind `inspection`) over the surface.
+
+    `plane`: sections by parallel planes along `direction_deg` from the longest extent; `geodesic`: lines of equal
+    distance, measured on the surface, from the longest central section. Both keep the step on the surface, go forth and
+    back, hold the array's heading in space, and split at holes and sharp turns.
+
+    The track of the TCP keeps `edge_margin_mm` from the edge at the ends of each pass; across, the swath of the
+    outermost pass reaches the margin line. Poses are spaced equally, at `point_spacing_mm` or an integer part of it;
+    each carries its triangle and barycentric coordinates, and normals are those of `curved` at that very point.
+    Raises `EchoBaseError` if the surface leaves no room or the raster would be unreasonably dense.
+    """
+    surface, inspection = curved.surface, setup.inspection
+    axes = scan_axes(surface, inspection.direction_deg)
+    mesh = PathMesh.of(surface)
+    cut = (plane_cut if inspection.strategy == "plane" else geodesic_cut)(curved, mesh, axes, setup)
+    spacing = acquisition_spacing_mm(setup)
+    track = tracks(cut.mesh, cut.chains, spacing, inspection.edge_margin_mm)
+    if len(track.run) > MOST_POSES:
+        raise fail(
+            "raster-too-dense",
+            f"The raster would have {len(track.run)} poses.",
+            "Give a larger inspection.step_mm or point_spacing_mm, or a smaller surface.",
+            "setup.json: inspection",
+        )
+    if len(track.level) == 0:
+        raise fail(
+            "raster-empty",
+            f"No pass fits on the surface with {inspection.edge_margin_mm:g} mm kept from its edges.",
+            "Give a smaller inspection.edge_margin_mm, or choose a larger surface.",
+            "setup.json: inspection.edge_margin_mm",
+        )
+    if not cut.exact:
+        track = split_at_turns(track, _sharp(track, cut.mesh.face_normals, spacing))
+    track = _in_order(track, axes)
+    face, bary = cut.on_surface(track.face, track.bary)
+    points, normals = curved.evaluate(face, bary)
+    across = cut.across(track.face, normals)
+    travel = _travel(track, points, normals, across, spacing, cut.exact)
+    data = DataRuns(
+        points,
+        normals,
+        travel,
+        surface.part_faces[face],
+        bary,
+        track.run,
+        headings(points, normals, travel, track.run, across),
+    )
+    path = assemble(data, "inspection", setup.standoff_mm, spacing)
+    return with_links(path, curved)
+
+
+def acquisition_spacing_mm(setup: Setup) -> float:
+    """Return the spacing of dense poses: `point_spacing_mm`, or an integer part of it up to `GEOMETRY_SPACING_MM`."""
+    asked = setup.inspection.point_spacing_mm
+    return asked / float(np.ceil(asked / GEOMETRY_SPACING_MM - 1e-9))
+
+
+def _sharp(track: Tracks, face_normals: Array, spacing: float) -> NDArray[np.bool_]:
+    """Return the points (n,) where a track turns sharply within the surface: the sharpest one of each corner."""
+    n = len(track.run)
+    sharp = np.zeros(n, dtype=bool)
+    w = max(int(np.ceil(3.0 / spacing)), 1)
+    i = np.arange(w, n - w)
+    i = i[track.run[i - w] == track.run[i + w]]
+    if not len(i):
+        return sharp
+    up = face_normals[track.face[i]]
+    back, ahead = (
+        tangent(d, up) for d in (track.points[i] - track.points[i - w], track.points[i + w] - track.points[i])
+    )
+    turn = np.zeros(n)
+    turn[i] = np.degrees(np.arccos(np.clip(np.einsum("ij,ij->i", back, ahead), -1.0, 1.0)))
+    top = maximum_filter1d(turn, 2 * w + 1)
+    return (turn >= top) & (turn > _SHARP_DEG)
+
+
+def _in_order(track: Tracks, axes: ScanAxes) -> Tracks:
+    """Return the runs in the order they are travelled; loops alternate, so that hoses do not wind up."""
+    first, last = track.bounds()
+    start, end = track.points[first], track.points[last]
+    order, flip = nearest_order(start, end)
+    if bool((end[0] - start[0]) @ axes.along < 0) and not track.closed[0]:
+        order, flip = nearest_order(end, start)
+        flip = ~flip
+    loops = track.closed[order]
+    flip = np.where(loops, np.cumsum(loops) % 2 == 0, flip)
+    return track.arranged(order, flip)
+
+
+def _travel(track: Tracks, points: Array, normals: Array, across: Array, spacing: float, exact: bool) -> Array:
+    """Return the direction of travel (n, 3), unit and tangent; smooth, for the array turns with it."""
+    rough = tangent(_along_track(track, points, spacing), normals)
+    if not exact:
+        return rough
+    straight = np.cross(across, normals)
+    straight *= np.sign(np.einsum("ij,ij->i", straight, rough))[:, None]
+    sound = np.linalg.norm(straight, axis=1, keepdims=True) > 0.5
+    return np.where(sound, straight, rough)
+
+
+def _along_track(track: Tracks, points: Array, spacing: float) -> Array:
+    """Return derivatives (n, 3) of the tracks: local parabolas over `_SMOOTHING_MM` either side, one-sided at ends."""
+    out = np.zeros_like(points)
+    half = max(int(np.ceil(_SMOOTHING_MM / spacing)), 2)
+    first, last = track.bounds()
+    for a, b, closed in zip(first, last, track.closed, strict=True):
+        run = points[a : b + 1]
+        n = len(run)
+        if closed and n > 2 * half:
+            around = np.concatenate([run[-half - 1 : -1], run, run[1 : half + 1]])
+            out[a : b + 1] = savgol_filter(around, 2 * half + 1, 2, deriv=1, axis=0)[half:-half]
+        elif n < 5:
+            out[a : b + 1] = np.gradient(run, axis=0)
+        else:
+            window = min(2 * half + 1, n if n % 2 else n - 1)
+            out[a : b + 1] = savgol_filter(run, window, 2, deriv=1, axis=0)
+    return out
