@@ -24,7 +24,7 @@ from planner.issues import Issue
 CONSOLE_BYTES = 20_000
 ROOT = Path(__file__).resolve().parents[1]
 # Libraries of the child that start a thread for every core, each with its own arena, run into the memory limit.
-THREADS = {name: "1" for name in ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS")} | {
+THREADS = dict.fromkeys(("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS"), "1") | {
     "POLARS_MAX_THREADS": "2",
     "MALLOC_ARENA_MAX": "2",
 }

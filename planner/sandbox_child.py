@@ -22,7 +22,7 @@ def main(folder: str) -> None:
         outcome = _call(work, request)
     except MemoryError:
         outcome = {"memory": True}
-    except Exception as error:  # noqa: BLE001  whatever a reader throws is an answer about the file
+    except Exception as error:
         issues = getattr(error, "issues", None)
         if issues:
             outcome = {"issues": [issue.to_json() for issue in issues]}

@@ -74,7 +74,7 @@ def boundary(surface: InspectionSurface) -> tuple[BoundaryCurve, ...]:
     original = surface.faces[face, (corner + 1) % 3].astype(np.int64)
     kinds = _kinds(surface, start, end, face)
     seen = np.zeros(len(face), dtype=bool)
-    curves = []
+    curves: list[BoundaryCurve] = []
     for first in range(len(face)):
         if seen[first]:
             continue
