@@ -1,1 +1,1 @@
-"""KRL: program model, preflight, writer, and a reader of its own that proves every exported program."""
+"""KRL: program model, preflight, writer per controller, and a reader that proves every exported program."""
