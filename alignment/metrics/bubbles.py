@@ -1,5 +1,7 @@
 """Echoes that cannot be the front wall: far from their neighbours along the pass. They would make any range infinite."""
 
+from typing import Any
+
 import numpy as np
 from numpy.typing import NDArray
 from scipy.ndimage import median_filter
@@ -13,7 +15,7 @@ SIGMAS = 8.0
 MAD = 1.4826
 
 
-def bubbles(distance_mm: Array, order: NDArray[np.intp], group: NDArray[np.int64]) -> NDArray[np.bool_]:
+def bubbles(distance_mm: Array, order: NDArray[np.intp], group: NDArray[Any]) -> NDArray[np.bool_]:
     """Return which readings (n,) stand more than `LEAST_MM`, and `SIGMAS` robust deviations, off a running median.
 
     order: the readings in order along each track (one law of one pass); group (n,): the track of each reading.
@@ -35,7 +37,7 @@ def bubbles(distance_mm: Array, order: NDArray[np.intp], group: NDArray[np.int64
     return out
 
 
-def _end_median(d: Array, track: NDArray[np.int64], half: int) -> Array:
+def _end_median(d: Array, track: NDArray[Any], half: int) -> Array:
     """Median over the part of the window that lies on the same track."""
     n = len(d)
     index = np.clip(np.arange(n)[:, None] + np.arange(-half, half + 1), 0, n - 1)

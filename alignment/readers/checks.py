@@ -112,7 +112,7 @@ def length_unit(points: Array, name: str) -> Array:
 
 def finite_rows(points: Array, keys: tuple[str, ...], name: str, issues: list[dict[str, Any]]) -> NDArray[np.bool_]:
     """Return which rows are whole; say how many are not; refuse if none is."""
-    keep = np.isfinite(points).all(axis=1)
+    keep: NDArray[np.bool_] = np.asarray(np.isfinite(points).all(axis=1))
     lost = int(len(keep) - np.count_nonzero(keep))
     if lost == len(keep):
         raise fail("points-all-lost", f"no row has all of {', '.join(keys)}.", "Export the cloud again.", name)

@@ -28,6 +28,7 @@ def parse_pcd(source: Path, name: str) -> dict[str, Any]:
             header[words[0].upper()] = words[1:]
     dtype, columns, count = _dtype(header, name)
     body, kind = raw[end + 1 :], header["DATA"][0].lower()
+    rows: Any
     if kind == "ascii":
         rows = _ascii(body, columns, count, name)
     elif kind == "binary":
@@ -64,7 +65,7 @@ def _frombuffer(body: bytes, dtype: np.dtype[Any], count: int, name: str) -> NDA
     return np.frombuffer(body, dtype=dtype, count=count)
 
 
-def _compressed(body: bytes, dtype: np.dtype[Any], count: int, name: str) -> dict[str, NDArray[Any]] | NDArray[Any]:
+def _compressed(body: bytes, dtype: np.dtype[Any], count: int, name: str) -> NDArray[Any]:
     """Fields one after the other (not point by point), as one LZF block after its two sizes."""
     packed, plain = (int(v) for v in np.frombuffer(body[:8], dtype="<u4")) if len(body) >= 8 else (0, 0)
     if plain != count * dtype.itemsize or len(body) < 8 + packed:

@@ -1,7 +1,6 @@
 """What the cell adds: wandering of the robot, and readings that are wrong or missing. All random numbers are seeded."""
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.signal import lfilter
 from scipy.spatial.transform import Rotation
 
@@ -49,8 +48,8 @@ def actual_poses(Ts_base_tcp: Transform, unit_noise: Array, noise: Noise) -> Tra
 
 def bubbles(
     distance_mm: Array, amplitude_pct: Array, noise: Noise, rng: np.random.Generator, reference_pct: float
-) -> tuple[Array, Array, NDArray[np.bool_]]:
-    """Return distances and amplitudes with a share of the readings replaced by a wrong echo, and which ones.
+) -> tuple[Array, Array]:
+    """Return distances and amplitudes with a share of the readings replaced by a wrong echo.
 
     A wrong echo comes from anywhere between a fifth of the typical distance and twice it, at any amplitude.
     """
@@ -58,8 +57,8 @@ def bubbles(
     where, strength = rng.random(len(distance_mm)), rng.random(len(distance_mm))
     heard = distance_mm[np.isfinite(distance_mm)]
     if not hit.any() or len(heard) == 0:
-        return distance_mm, amplitude_pct, hit & False
+        return distance_mm, amplitude_pct
     typical = float(np.median(heard))
     wrong = typical * (0.2 + 1.8 * where)
     loud = reference_pct * (0.1 + 0.9 * strength)
-    return np.where(hit, wrong, distance_mm), np.where(hit, loud, amplitude_pct), hit
+    return np.where(hit, wrong, distance_mm), np.where(hit, loud, amplitude_pct)

@@ -70,8 +70,8 @@ def _blocks(path: ProgramPath) -> list[tuple[int, int]]:
     out = []
     for start in starts:
         same = smooth[start:] & (path.block[start:] == path.block[start])
-        stop = start + (len(same) if same.all() else int(np.argmin(same)))
-        if stop - 1 > max(start - 1, 0):
+        stop = int(start) + (len(same) if same.all() else int(np.argmin(same)))
+        if stop - 1 > max(int(start) - 1, 0):
             out.append((max(int(start) - 1, 0), int(stop) - 1))
     return out
 

@@ -1,43 +1,51 @@
-"""The inspected face of the true part: its closest points, its normals and its rim, in `part`, mm."""
+"""A face of the true part: its closest points, its normals and its rim, in `part`, mm."""
 
 from dataclasses import dataclass
+from functools import cached_property
 
 import igl
 import numpy as np
 from numpy.typing import NDArray
 
 from alignment.simulator.curve import CurvedTriangles
-from alignment.simulator.patches import Patches, patches
+from alignment.simulator.patches import Patches
 from alignment.simulator.refine import refine
-from alignment.simulator.truth import Field
 from planner.frames import Array
-from planner.surface.inspection import InspectionSurface
 
 Index = NDArray[np.int64]
 
 SAG_MM = 0.01
 """Flat pieces stand less than this off the curve; what is left is added back to second order."""
-SPRUNG_EDGE_MM = 6.0
-"""Pieces of a sprung-back part are shorter than this, so that the displacement is seen between its corners."""
 RIM_STEP_MM = 2.0
-# Base of the central difference that turns a displacement field into a tilt (mm).
-GRADIENT_STEP_MM = 0.05
 
 
 @dataclass(frozen=True, eq=False)
 class TrueFace:
-    """Small triangles of the true face, all corners separate. corners, normals (3 k, 3); rim_a, rim_b (r, 3): rim segments,
-    the face on their left seen from outside."""
+    """Small triangles of the true face, all corners separate. corners, normals (3 k, 3). rim_a, rim_b (r, 3): ends of the
+    rim segments, the face on their left seen from outside; rim_na, rim_nb (r, 3): normals of the face there.
+    """
 
     corners: Array
     normals: Array
     rim_a: Array
     rim_b: Array
+    rim_na: Array
+    rim_nb: Array
+
+    @cached_property
+    def triangles(self) -> Index:
+        """Rows of `corners` of each small triangle (k, 3)."""
+        return np.arange(len(self.corners), dtype=np.int64).reshape(-1, 3)
+
+    @cached_property
+    def _tree(self) -> igl.AABB:
+        tree = igl.AABB()
+        tree.init(self.corners, self.triangles)
+        return tree
 
     def foot(self, points: Array) -> tuple[Array, Array]:
         """Return the closest points (n, 3) of the smooth face and the outward unit normals there (n, 3)."""
-        triangles = np.arange(len(self.corners), dtype=np.int64).reshape(-1, 3)
-        _, face, flat = igl.point_mesh_squared_distance(np.ascontiguousarray(points), self.corners, triangles)
+        _, face, flat = self._tree.squared_distance(self.corners, self.triangles, np.ascontiguousarray(points))
         face = face.ravel()
         a, b, c = (self.corners[3 * face + i] for i in range(3))
         na, nb, nc = (self.normals[3 * face + i] for i in range(3))
@@ -65,37 +73,18 @@ def barycentric(p: Array, a: Array, b: Array, c: Array) -> tuple[Array, Array, A
     return np.clip(1.0 - wb - wc, 0.0, 1.0), wb, wc
 
 
-def true_face(surface: InspectionSurface, field: Field | None) -> TrueFace:
-    """Return the smooth face behind the triangles of the inspection surface, displaced along its normal by `field`."""
-    part_patches = patches(surface.part, surface.part_faces)
-    mine = part_patches.faces[part_patches.inspected]
-    curved = CurvedTriangles(part_patches.vertices[mine], part_patches.normals[mine])
-    pieces = refine(curved, SAG_MM, np.inf if field is None else SPRUNG_EDGE_MM)
-    corners, normals = pieces.corners.reshape(-1, 3), pieces.normals.reshape(-1, 3)
-    rim_a, rim_b, rim_na, rim_nb = _rim(part_patches, mine)
-    if field is not None:
-        corners, normals = displaced(corners, normals, field)
-        rim_a, _ = displaced(rim_a, rim_na, field)
-        rim_b, _ = displaced(rim_b, rim_nb, field)
-    return TrueFace(np.ascontiguousarray(corners), np.ascontiguousarray(normals), rim_a, rim_b)
+def smooth_face(all_patches: Patches, which: NDArray[np.bool_], edge_mm: float) -> TrueFace:
+    """Return the smooth face behind the triangles `which` (f,) of a part, as CAD has it."""
+    mine = all_patches.faces[which]
+    curved = CurvedTriangles(all_patches.vertices[mine], all_patches.normals[mine])
+    pieces = refine(curved, SAG_MM, edge_mm)
+    corners, normals = (np.ascontiguousarray(v.reshape(-1, 3)) for v in (pieces.corners, pieces.normals))
+    rim = rim_segments(all_patches, mine)
+    return TrueFace(corners, normals, *rim)
 
 
-def displaced(points: Array, normals: Array, field: Field) -> tuple[Array, Array]:
-    """Return points moved by `field` along their normals, and the normals tilted by its slope."""
-    z = normals
-    x = np.cross(z, np.where(np.abs(z[:, :1]) < 0.6, [[1.0, 0.0, 0.0]], [[0.0, 1.0, 0.0]]))
-    x /= np.linalg.norm(x, axis=1, keepdims=True)
-    tilted = z.copy()
-    h = GRADIENT_STEP_MM
-    for axis in (x, np.cross(z, x)):
-        slope = (field(points + h * axis) - field(points - h * axis)) / (2.0 * h)
-        tilted -= slope[:, None] * axis
-    tilted /= np.linalg.norm(tilted, axis=1, keepdims=True)
-    return points + field(points)[:, None] * z, tilted
-
-
-def _rim(part_patches: Patches, faces: Index) -> tuple[Array, Array, Array, Array]:
-    """Rim segments of the face along its curved edges, with the normals of the face at their ends."""
+def rim_segments(part_patches: Patches, faces: Index) -> tuple[Array, Array, Array, Array]:
+    """Return start, end and both normals (r, 3) of the rim segments of some faces, along their curved edges."""
     v = len(part_patches.vertices)
     start, end = faces.ravel(), np.roll(faces, -1, axis=1).ravel()
     twin = np.isin(start * v + end, end * v + start)
