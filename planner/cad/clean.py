@@ -132,9 +132,9 @@ def _voids(
     low, high = np.full((len(inward), 3), np.inf), np.full((len(inward), 3), -np.inf)
     np.minimum.at(low, body, corners.min(axis=1))
     np.maximum.at(high, body, corners.max(axis=1))
-    within = (low[inward, None] > low[None, outward]).all(axis=2) & (high[inward, None] < high[None, outward]).all(
-        axis=2
-    )
+    above = np.asarray(low[inward, None] > low[None, outward])
+    below = np.asarray(high[inward, None] < high[None, outward])
+    within = np.logical_and(above, below).sum(axis=2) == 3
     voids[np.flatnonzero(inward)] = within.any(axis=1)
     return voids
 

@@ -82,4 +82,6 @@ def _wrong_size(extents: Array, unit: str, kind: Format, name: str) -> EchoBaseE
 
 
 def _size(extents_mm: Array) -> str:
+    if extents_mm.max() >= 10_000.0:
+        return " x ".join(f"{v / 1000.0:.4g}" for v in extents_mm) + " m"
     return " x ".join(f"{v:.4g}" for v in extents_mm) + " mm"

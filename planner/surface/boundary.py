@@ -198,7 +198,7 @@ def _march(vertices: Array, faces: Array, start: Array, distances: Array) -> Arr
     used, compact = np.unique(faces, return_inverse=True)
     solver = potpourri3d.MeshFastMarchingDistanceSolver(vertices[used], compact.reshape(-1, 3))
     row = np.searchsorted(used, start)
-    curves = [[(int(v), [])] for v in row]
+    curves: list[list[tuple[int, list[float]]]] = [[(int(v), [])] for v in row]
     result = np.full(len(vertices), np.inf)
     result[used] = solver.compute_distance(curves, [[float(d)] for d in distances])
     return result
