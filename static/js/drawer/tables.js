@@ -1,0 +1,55 @@
+// Tables: key points, directions of the alignment, issues of a plan.
+
+import { fill, h } from "../dom.js";
+import { deg, fixed, mm, whole } from "../format.js";
+import { tag, toneOf } from "../status.js";
+
+/** A table: columns [{title, cell(row), text}] over rows; rows can be picked. */
+export function table(columns, rows, onpick = null) {
+  return h("table", {}, h("thead", {}, h("tr", {}, columns.map((c) => h("th", { class: c.text ? "l" : null, scope: "col" }, c.title)))),
+    h("tbody", {}, rows.map((row) => h("tr", { class: onpick ? "pick" : null, onclick: onpick && (() => onpick(row)) },
+      columns.map((c) => h("td", { class: c.text ? "l" : "num" }, c.cell(row)))))));
+}
+
+/** Key points as the alignment judged them. */
+export function matches(body, keypoints, focus) {
+  if (!keypoints?.length) return fill(body, h("p", { class: "nothing" }, "No key points were evaluated."));
+  return fill(body, table([
+    { title: "Key point", text: true, cell: (k) => k.id },
+    { title: "", text: true, cell: (k) => tag(toneOf(k.status), k.status) },
+    { title: "Residual, mm", cell: (k) => mm(k.residual_mm) },
+    { title: "Normal, deg", cell: (k) => deg(k.normal_angle_deg) },
+    { title: "Readings", cell: (k) => whole(k.readings) },
+    { title: "Amplitude, %FSH", cell: (k) => fixed(k.amplitude_pct, 1) },
+    { title: "ToF, µs", cell: (k) => fixed(k.tof_us, 3) },
+    { title: "X, mm", cell: (k) => mm(k.x_mm) }, { title: "Y, mm", cell: (k) => mm(k.y_mm) }, { title: "Z, mm", cell: (k) => mm(k.z_mm) },
+    { title: "Reason", text: true, cell: (k) => k.reason ?? "" },
+  ], keypoints, (k) => focus(k.id)));
+}
+
+/** The six directions the alignment could or could not measure. */
+export function directions(body, list) {
+  if (!list?.length) return fill(body, h("p", { class: "nothing" }, "No directions were reported."));
+  const names = ["rX", "rY", "rZ", "X", "Y", "Z"];
+  return fill(body, table([
+    { title: "Direction", text: true, cell: (d) => `${list.indexOf(d) + 1}` },
+    { title: "", text: true, cell: (d) => tag(toneOf(d.status), d.status) },
+    { title: "Sigma", cell: (d) => fixed(d.sigma, 4) },
+    ...names.map((name, i) => ({ title: name, cell: (d) => fixed(Array.isArray(d.vector) ? d.vector[i] : d.vector?.[i], 4) })),
+  ], list));
+}
+
+/** Key points as they are planned. */
+export function planned(body, keypoints, issues, focus) {
+  if (!keypoints?.length) return fill(body, h("p", { class: "nothing" }, "No key points yet. Click on the tinted surface, or let EchoBase suggest some."));
+  const worst = (id) => {
+    const mine = issues.filter((i) => i.where === id);
+    return mine.find((i) => i.severity === "error") ?? mine.find((i) => i.severity === "warning");
+  };
+  return fill(body, table([
+    { title: "Key point", text: true, cell: (k) => k.id },
+    { title: "", text: true, cell: (k) => { const w = worst(k.id); return w ? tag(w.severity === "error" ? "bad" : "warn", w.severity === "error" ? "unusable" : "doubtful") : tag("good", "usable"); } },
+    { title: "X, mm", cell: (k) => mm(k.x_mm) }, { title: "Y, mm", cell: (k) => mm(k.y_mm) }, { title: "Z, mm", cell: (k) => mm(k.z_mm) },
+    { title: "Why", text: true, cell: (k) => worst(k.id)?.message ?? "" },
+  ], keypoints, (k) => focus(k.id)));
+}

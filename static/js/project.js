@@ -1,0 +1,139 @@
+// What the page knows of the open project: resources as the server has them, refreshed when it says that they changed.
+
+import { ApiError, get, post, put } from "./api.js";
+import { listen } from "./events.js";
+
+// Which resources to ask for again when something changed.
+const RESULTS = ["plan", "alignment", "assessment"];
+const CONCERNS = {
+  part: ["part", "surface", "setup", "keypoints", ...RESULTS],
+  setup: ["setup", ...RESULTS],
+  surface: ["surface", ...RESULTS],
+  keypoints: ["keypoints", ...RESULTS],
+  plan: ["keypoints", ...RESULTS],
+  scan: ["scans", ...RESULTS],
+  alignment: ["alignment"],
+  assessment: ["assessment"],
+  project: ["project"],
+};
+const PATHS = { project: "", part: "/part", setup: "/setup", surface: "/surface", keypoints: "/keypoints", plan: "/plan", scans: "/scans", alignment: "/alignments", assessment: "/assessments" };
+const NEWEST = new Set(["alignment", "assessment"]);
+const ALL = ["project", "part", "setup", "surface", "keypoints", "plan", "scans", "alignment", "assessment"];
+
+export class Project {
+  constructor(id, changed) {
+    this.id = id;
+    this.changed = changed;
+    this.path = `/projects/${id}`;
+    this.data = { jobs: new Map(), insight: null, people: { clients: 0, names: [] }, viewIssues: [] };
+    this.online = true;
+    this.pending = new Set();
+    this.undoSetups = [];
+    this.stop = listen(`${this.path}/events`, ["changed", "job", "insight", "people", "view", "view-error", "resync"], (name, data) => this.hear(name, data), (up) => this.link(up));
+  }
+
+  close() { this.stop(); clearTimeout(this.timer); }
+
+  link(up) {
+    if (this.online === up) return;
+    this.online = up;
+    if (up) this.load(ALL);
+    this.changed("link");
+  }
+
+  hear(name, data) {
+    if (name === "job") {
+      const before = this.data.jobs.get(data.id);
+      this.data.jobs.set(data.id, data);
+      this.changed("jobs");
+      if (data.state === "done" && before?.state !== "done") this.load(ALL);
+      for (const waiter of this.waiters?.get(data.id) ?? []) if (!["queued", "running"].includes(data.state)) waiter(data);
+    } else if (name === "insight" || name === "people") {
+      this.data[name] = data;
+      this.changed(name);
+    } else if (name === "view-error") {
+      this.data.viewIssues = [{ ...data, at: Date.now() }, ...this.data.viewIssues.filter((i) => i.code !== data.code)].slice(0, 4);
+      this.changed("issues");
+    } else if (name === "view") {
+      this.changed("view");
+    } else {
+      if (data.what === "deleted") this.deleted = true;
+      this.load(CONCERNS[data.what] ?? ALL);
+    }
+  }
+
+  /** Ask for resources again, soon and once. */
+  load(names) {
+    for (const name of names) this.pending.add(name);
+    clearTimeout(this.timer);
+    return new Promise((resolve) => {
+      this.loaded = [...(this.loaded ?? []), resolve];
+      this.timer = setTimeout(() => this.fetchPending(), 30);
+    });
+  }
+
+  async fetchPending() {
+    const names = [...this.pending];
+    const done = this.loaded ?? [];
+    this.pending.clear();
+    this.loaded = [];
+    await Promise.all(names.map((name) => this.fetchOne(name)));
+    this.changed("data");
+    for (const resolve of done) resolve();
+  }
+
+  async fetchOne(name) {
+    try {
+      const answer = await get(`${this.path}${PATHS[name]}`);
+      // Of results the newest counts.
+      this.data[name] = NEWEST.has(name) ? (answer.at(-1) ?? null) : answer;
+    } catch (error) {
+      if (error instanceof ApiError && [404, 409].includes(error.status)) this.data[name] = null;
+      if (name === "project" && error.status === 404) this.deleted = true;
+    }
+  }
+
+  /** Start a job and wait for its end; resolves with the job, rejects with an ApiError. */
+  async run(path, body) {
+    const job = await post(`${this.path}${path}`, body);
+    if (job.state === "done") { await this.load(ALL); return job; }
+    this.data.jobs.set(job.id, job);
+    this.changed("jobs");
+    const over = await this.over(job.id);
+    if (over.state === "failed") throw new ApiError(422, over.error?.issues ?? over.issues ?? []);
+    if (over.state === "done") await this.load(ALL);
+    return over;
+  }
+
+  /** Wait until a job is over; asks now and then, in case an event was lost with the link. */
+  over(id) {
+    this.waiters ??= new Map();
+    return new Promise((resolve) => {
+      const finish = (job) => { clearInterval(poll); this.waiters.delete(id); this.data.jobs.set(id, job); this.changed("jobs"); resolve(job); };
+      this.waiters.set(id, [finish]);
+      const poll = setInterval(async () => {
+        try {
+          const job = await get(`/jobs/${id}`);
+          if (!["queued", "running"].includes(job.state)) finish(job);
+        } catch (error) {
+          if (error.status === 404) finish({ id, state: "failed", issues: error.issues });
+        }
+      }, 2000);
+    });
+  }
+
+  /** Save the setup; the one before can be brought back. */
+  async saveSetup(next) {
+    const before = this.data.setup;
+    this.data.setup = await put(`${this.path}/setup`, next);
+    if (before) this.undoSetups.push(before);
+    this.changed("data");
+  }
+
+  async undoSetup() {
+    const before = this.undoSetups.pop();
+    if (!before) return;
+    this.data.setup = await put(`${this.path}/setup`, before);
+    this.changed("data");
+  }
+}
