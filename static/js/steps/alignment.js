@@ -1,0 +1,98 @@
+// Step 8: where the part is: the correction, how well it is known, and what it changes.
+
+import { get, post } from "../api.js";
+import { askAcceptance } from "../dialog.js";
+import { button, h } from "../dom.js";
+import { histograms } from "../drawer/plots.js";
+import { directions, matches } from "../drawer/tables.js";
+import { AXES, facts, fixed, isAngle, mm, ofAxis, pct, poseKey, whole } from "../format.js";
+import { signed } from "../journey.js";
+import { issueList, tag, toneOf, verdict } from "../status.js";
+
+export const watchesView = true;
+export const watchesJobs = true;
+const WORDS = { pass: ["Pass", "The part is found; the corrected program may run after a dry run."], partial: ["Partial", "Usable only if you accept what is said below."], fail: ["Fail", "No corrected program is written."] };
+
+export function content(shell) {
+  const { alignment: a, scans, setup } = shell.project.data;
+  const local = (shell.local.alignment ??= { method: "map", edges: "", non_rigid: false, layer: "after" });
+  if (!a) return [verdict("none", "Not aligned yet", scans?.length ? "The alignment finds the part from the readings." : "Upload a scan, or rehearse one, first."), options(shell, local)];
+  const [word, text] = WORDS[a.verdict] ?? [a.verdict, ""];
+  return [
+    a.stale ? verdict("warn", "Out of date", `Changed since: ${a.stale_because.join(", ")}.`) : a.accepted ? verdict("good", "Accepted", `By ${a.accepted.name}: ${a.accepted.reason}`) : verdict(toneOf(a.verdict), word, text),
+    correction(a, setup, shell.local.truth),
+    layers(shell, local),
+    before(a),
+    facts([["Residual, rms", mm(a.residual?.rms_mm), "mm"], ["Residual, 95 %", mm(a.residual?.p95_mm), "mm"], ["Readings used", whole(a.residual?.readings)], ["Method", h("span", {}, a.method === "map" ? "MAP, all readings" : "key points (paper)")]]),
+    issueList(a.issues, 8),
+    options(shell, local),
+  ];
+}
+
+function correction(a, setup, truth) {
+  const rows = AXES.map((axis) => {
+    const key = poseKey(axis);
+    const d = a.dof?.[axis] ?? {};
+    const unit = isAngle(axis) ? "deg" : "mm";
+    return h("tr", {}, h("td", {}, `${axis.toUpperCase()} `, h("span", { class: "unit" }, unit)),
+      h("td", { class: "num" }, h("b", {}, signed(a.correction[key], isAngle(axis) ? 4 : 3))), h("td", { class: "num soft" }, `± ${ofAxis(axis, d.sigma)}`), h("td", { class: "l" }, d.status && tag(toneOf(d.status), d.status)));
+  });
+  const bases = AXES.map((axis) => h("tr", {}, h("td", {}, axis.toUpperCase()), h("td", { class: "num soft" }, ofAxis(axis, setup.base[poseKey(axis)])), h("td", { class: "num" }, ofAxis(axis, a.base[poseKey(axis)])),
+    truth && h("td", { class: "num soft" }, ofAxis(axis, truth[poseKey(axis)]))));
+  return [
+    h("div", {}, h("h3", {}, "Correction of BASE, one sigma"), h("table", { class: "correction" }, h("tbody", {}, rows))),
+    h("div", {}, h("h3", {}, `BASE_DATA[${a.base.number}]`), h("table", {}, h("thead", {}, h("tr", {}, ["", "nominal", "corrected", truth && "rehearsed offset"].filter((t) => t !== undefined && t !== null).map((t) => h("th", {}, t)))), h("tbody", {}, bases))),
+  ];
+}
+
+function layers(shell, local) {
+  const set = (layer) => { local.layer = layer; shell.view.send({ layers: { before: layer === "before", cad: layer === "before", after: layer === "after", found: layer === "after" } }); };
+  return h("div", { class: "stack" }, h("h3", {}, "Deviation map"), h("div", { class: "row tight", role: "group" }, [["before", "Before"], ["after", "After"]].map(([k, text]) => button(text, () => set(k), { class: local.layer === k ? "on" : "", "aria-pressed": String(local.layer === k) }))));
+}
+
+function before(a) {
+  const { before: b, after: c } = a.prediction ?? {};
+  if (!b || !c || b.tof_std_mm === undefined) return null;
+  const row = (name, key, show) => h("tr", {}, h("td", {}, name), h("td", { class: "num soft" }, show(b[key])), h("td", { class: "num" }, show(c[key])));
+  return h("div", {}, h("h3", {}, "Predicted for the inspection scan"), h("table", {}, h("thead", {}, h("tr", {}, ["", "before", "after"].map((t) => h("th", {}, t)))), h("tbody", {},
+    row("Distance, std (mm)", "tof_std_mm", mm), row("Distance, range (mm)", "tof_range_mm", mm), row("Largest tilt (deg)", "tilt_max_deg", (v) => fixed(v, 3)), row("Within 2 dB", "within_2db", (v) => pct(v)))));
+}
+
+function options(shell, local) {
+  const radio = (name, value, text) => h("label", { class: "row tight" }, h("input", { type: "radio", name, value, checked: local[name] === value, onchange: () => { local[name] = value; shell.draw(); } }), text);
+  return h("details", { class: "group", open: local.open, ontoggle: (e) => { local.open = e.target.open; } }, h("summary", {}, h("span", {}, "Options"), h("span", { class: "glance" }, local.method === "map" ? "MAP" : "key points")),
+    h("div", { class: "fields stack" }, radio("method", "map", "All readings (MAP)"), radio("method", "keypoints", "Key points only (the paper's method)"),
+      h("label", { class: "row tight" }, h("input", { type: "checkbox", name: "non_rigid", checked: local.non_rigid, onchange: (e) => { local.non_rigid = e.target.checked; } }), "The part may have sprung back: adapt the poses"),
+      h("label", { class: "field wide" }, "Edges", h("select", { name: "edges", onchange: (e) => { local.edges = e.target.value; } }, [["", "wherever the scan crosses them"], ["true", "always"], ["false", "never"]].map(([v, text]) => h("option", { value: v, selected: v === local.edges }, text))))));
+}
+
+export function footer(shell) {
+  const { alignment: a, scans } = shell.project.data;
+  const local = shell.local.alignment ?? {};
+  const busy = shell.busy("alignment");
+  const run = () => shell.do(async () => {
+    await shell.project.run("/alignments", { method: local.method, non_rigid: local.non_rigid, ...(local.edges ? { edges: local.edges === "true" } : {}) });
+    local.layer = "after";
+    await shell.view.send({ step: "alignment" });
+  });
+  const again = button(busy ? "Aligning…" : a ? "Align again" : "Align", run, { class: a && !a.stale && !busy ? "tiny" : "primary", disabled: !scans?.length || busy, key: "align" });
+  if (!a || a.stale || busy) return again;
+  if (a.verdict === "partial" && !a.accepted) return [again, button("Accept…", () => accept(shell, a), { class: "primary" })];
+  return [again, button("Continue: report", () => { location.hash = `#/p/${shell.project.id}/report`; }, { class: "primary", disabled: a.verdict === "fail" })];
+}
+
+/** Take a partial result over. */
+export async function accept(shell, a) {
+  const answer = await askAcceptance(issueList(a.issues, 5));
+  if (answer) await shell.do(async () => { await post(`${shell.project.path}/alignments/${a.number}/accept`, answer); await shell.project.load(["alignment"]); });
+}
+
+export function drawer(shell) {
+  const { alignment: a } = shell.project.data;
+  if (!a) return { tabs: [], stamp: "" };
+  return { stamp: `${a.number} ${a.stale}`, tabs: [
+    { key: "histogram", title: "Before and after", draw: async (body, alive) => histograms(body, alive, await get(`${shell.project.path}/charts/deviation`)) },
+    { key: "points", title: "Key points", draw: (body) => matches(body, a.keypoints, (id) => shell.view.send({ focus: id })) },
+    { key: "directions", title: "Directions", draw: (body) => directions(body, a.directions) },
+  ] };
+}

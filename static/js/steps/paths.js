@@ -1,0 +1,56 @@
+// Step 5: the alignment path and the inspection raster, walked pose by pose.
+
+import { button, h } from "../dom.js";
+import { AXES, deg, facts, fixed, isAngle, mm, num, pct, poseKey, whole } from "../format.js";
+import { share } from "../journey.js";
+import { issueList, verdict } from "../status.js";
+
+export const watchesView = true;
+export const watchesJobs = true;
+
+export function content(shell) {
+  const { plan, part } = shell.project.data;
+  if (!part) return verdict("none", "No part yet", "Load one in step Part.");
+  if (!plan) return verdict("none", "Nothing is planned yet", "Planning lays both paths, checks tilt, standoff, reach and collision, and writes the programs.");
+  const errors = plan.issues.filter((i) => i.severity === "error").length;
+  const local = (shell.local.paths ??= { path: "inspection", at: 0 });
+  const chosen = plan[local.path];
+  return [
+    plan.stale ? verdict("warn", "Out of date", `Changed since: ${plan.stale_because.join(", ")}. Plan again.`)
+      : errors ? verdict("bad", `${errors} ${errors === 1 ? "problem" : "problems"} to solve`, "A program with a problem is not written.") : verdict("good", "Planned", "Both paths keep to the tolerances of the cell."),
+    h("div", { class: "row tight", role: "group", "aria-label": "Path" }, [["alignment", "Alignment scan"], ["inspection", "Inspection raster"]].map(([key, text]) => button(text, () => show(shell, local, key), { class: local.path === key ? "on" : "", "aria-pressed": String(local.path === key) }))),
+    chosen && facts([["Passes", whole(chosen.passes)], ["Poses", whole(chosen.poses)], ["Length with data on", fixed(chosen.data_length_mm / 1000, 3), "m"], ["Surface swept", pct(share(chosen))], ...(chosen.coverage?.missed_mm2 !== undefined ? [["Not covered", whole(chosen.coverage.missed_mm2), "mm²"]] : []),
+      ...Object.entries(chosen.checks ?? {}).filter(([, v]) => typeof v === "number").map(([k, v]) => worded(k, v))]),
+    walker(shell, local),
+    issueList(plan.issues),
+  ];
+}
+
+/** A number of the plan under a readable name with its unit. */
+export function worded(key, value) {
+  const units = { _mm_s: "mm/s", _mm2: "mm²", _mm: "mm", _deg: "deg", _s: "s", _pct: "%" };
+  const end = Object.keys(units).find((u) => key.endsWith(u)) ?? "";
+  const text = key.slice(0, key.length - end.length).replaceAll("_", " ");
+  return [text.charAt(0).toUpperCase() + text.slice(1), Number.isInteger(value) ? whole(value) : fixed(value, 3), units[end] ?? ""];
+}
+
+function show(shell, local, path) {
+  local.path = path;
+  shell.view.send({ layers: { alignment: path === "alignment", inspection: path === "inspection" }, probe: { path, at: local.at } });
+}
+
+function walker(shell, local) {
+  const probe = shell.view.state?.probe;
+  const slide = h("input", { type: "range", min: 0, max: 1000, step: 1, value: Math.round(local.at * 1000), name: "walk", "aria-label": "Place of the probe on the path", oninput: (e) => { local.at = Number(e.target.value) / 1000; shell.view.send({ probe: { path: local.path, at: local.at } }); } });
+  return h("div", { class: "stack" }, h("h3", {}, "Probe"), slide,
+    probe && probe.path === local.path && [facts([["Pose", `${whole(probe.pose)} / ${whole(probe.poses)}`], ["Pass", `${whole(probe.pass)} / ${whole(probe.passes)}`], ["Doing", h("span", {}, probe.role)], ["Standoff", mm(probe.standoff_mm), "mm"]]),
+      h("dl", { class: "facts" }, AXES.map((a) => [h("dt", {}, `${a.toUpperCase()} in BASE`), h("dd", {}, num(isAngle(a) ? deg(probe[poseKey(a)]) : mm(probe[poseKey(a)]), isAngle(a) ? "deg" : "mm"))]))]);
+}
+
+export function footer(shell) {
+  const { plan, part } = shell.project.data;
+  const busy = shell.busy("plan");
+  const run = () => shell.do(async () => { await shell.project.run("/plan"); await shell.view.refresh(); });
+  if (!plan || plan.stale || busy) return button(busy ? "Planning…" : plan ? "Plan again" : "Plan both paths", run, { class: "primary", disabled: !part || busy, key: "plan" });
+  return [button("Plan again", run, { class: "tiny", key: "again" }), button("Continue: programs", () => { location.hash = `#/p/${shell.project.id}/programs`; }, { class: "primary" })];
+}

@@ -1,0 +1,55 @@
+// Step 9: hand over: the corrected program, the report, and the proof by the inspection scan itself.
+
+import { href } from "../api.js";
+import { button, h } from "../dom.js";
+import { programs as krl } from "../drawer/krl.js";
+import { fixed, mm, pct } from "../format.js";
+import { issueList, verdict } from "../status.js";
+import { accept } from "./alignment.js";
+import { program } from "./programs.js";
+import { drop, rehearse } from "./scan.js";
+
+export const watchesJobs = true;
+const link = (path, text, props = {}) => h("a", { class: "btn", style: { textDecoration: "none", color: "inherit", lineHeight: "20px" }, href: href(path), ...props }, text);
+
+export function content(shell) {
+  const { alignment: a, assessment } = shell.project.data;
+  const local = (shell.local.report ??= { base: "", path: "corrected", progress: null });
+  if (!a) return [verdict("none", "Nothing to report yet", "Align first."), archive(shell)];
+  return [
+    program(shell, "corrected", "Corrected inspection", a.program, a.corrected_program ?? a.export ?? null),
+    h("div", { class: "row" }, link(`${shell.project.path}/alignments/${a.number}/report`, "Open the report", { target: "_blank", rel: "noopener" }), link(`${shell.project.path}/alignments/${a.number}/report?download=true`, "Save it", { download: "" }), link(`${shell.project.path}/alignments/${a.number}/files`, "Data (zip)", { download: "" })),
+    h("section", { class: "stack" }, h("h3", {}, "Inspection scan"), assessment ? judged(assessment) : h("p", { class: "soft small" }, "Upload the inspection scan (and the one from before the correction), or rehearse them, to see whether the front-wall echo stayed within 2 dB.")),
+    local.progress ? h("progress", { value: local.progress.share, max: 1 }) : drop(shell, local),
+    archive(shell),
+  ];
+}
+
+const archive = (shell) => h("section", { class: "stack" }, h("h3", {}, "Archive"), link(`${shell.project.path}/archive`, "Save the whole project (zip)", { download: "" }));
+
+function judged(s) {
+  const rows = [["Distance, std (mm)", "tof_std_mm", mm], ["Distance, range (mm)", "tof_range_mm", mm], ["Amplitude, range (dB)", "db_range_db", (v) => fixed(v, 2)], ["Mean |dB|", "mean_abs_db", (v) => fixed(v, 2)], ["Within 2 dB", "within_2db", (v) => pct(v)], ["Over-spray", "over_spray", (v) => pct(v)]];
+  return [s.stale && verdict("warn", "Out of date"), h("table", {}, h("thead", {}, h("tr", {}, ["", s.before && "before", "after"].filter((t) => typeof t === "string").map((t) => h("th", {}, t)))),
+    h("tbody", {}, rows.map(([name, key, show]) => h("tr", {}, h("td", {}, name), s.before && h("td", { class: "num soft" }, show(s.before[key])), h("td", { class: "num" }, show(s.after?.[key])))))),
+    Number.isFinite(s.improvement_pct) && h("p", {}, `Improvement ${fixed(s.improvement_pct, 1)} %`), issueList(s.issues, 5)];
+}
+
+export function footer(shell) {
+  const { alignment: a, scans } = shell.project.data;
+  if (a?.verdict === "partial" && !a.accepted && !a.stale) return button("Accept…", () => accept(shell, a), { class: "primary" });
+  const after = (scans ?? []).filter((s) => s.path === "corrected").at(-1);
+  const before = (scans ?? []).filter((s) => s.path === "inspection").at(-1);
+  const busy = shell.busy("simulate", "assessment");
+  const assess = () => shell.do(() => shell.project.run("/assessments", { scan: (after ?? before).number, ...(after && before ? { before: before.number } : {}) }));
+  return [
+    h("div", { class: "row tight" }, button("Rehearse before", () => rehearse(shell, "inspection"), { class: "tiny", disabled: busy }), button("Rehearse corrected", () => rehearse(shell, "corrected"), { class: "tiny", disabled: busy || !a?.program?.available })),
+    after || before ? button(busy ? "Working…" : "Assess the inspection scan", assess, { class: "primary", disabled: busy, key: "assess" })
+      : a?.program?.available && h("a", { class: "btn primary", style: { textAlign: "center", textDecoration: "none", lineHeight: "26px" }, href: href(`${shell.project.path}/programs/corrected`), download: "" }, "Download the corrected program"),
+  ];
+}
+
+export function drawer(shell) {
+  const { alignment: a } = shell.project.data;
+  if (!a?.program?.available) return { tabs: [], stamp: "" };
+  return { stamp: `${a.number}`, tabs: [{ key: "corrected", title: "KRL, corrected", draw: (body, alive) => krl(body, alive, `${shell.project.path}/programs/corrected`) }] };
+}

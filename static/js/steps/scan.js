@@ -1,0 +1,88 @@
+// Step 7: the readings: uploaded from the robot, or rehearsed on the simulated scanner.
+
+import { del, get, upload } from "../api.js";
+import { askRehearsal } from "../dialog.js";
+import { button, h } from "../dom.js";
+import { histograms, maps, profile } from "../drawer/plots.js";
+import { AXES, bytes, isAngle } from "../format.js";
+import { verdict } from "../status.js";
+
+export const watchesView = true;
+export const watchesJobs = true;
+
+export function content(shell) {
+  const { scans, plan } = shell.project.data;
+  const local = (shell.local.scan ??= { base: "", path: "alignment", progress: null });
+  return [
+    scans?.length ? list(shell, scans) : verdict("none", "No scan yet", plan ? "Run the alignment program on the robot and upload its readings. No robot at hand: rehearse." : "Plan the paths first."),
+    local.progress ? h("div", { class: "stack" }, h("span", {}, local.progress.text), h("progress", { value: local.progress.share, max: 1 }), button("Cancel", local.progress.cancel, { class: "tiny" })) : drop(shell, local),
+    colours(shell, scans),
+  ];
+}
+
+function list(shell, scans) {
+  return h("div", { class: "stack" }, h("h3", {}, "Scans"), h("table", {}, h("tbody", {}, scans.map((s) => h("tr", {},
+    h("td", {}, `#${s.number}`), h("td", { class: "l" }, s.files.map((f) => f.name).join(", "), h("br"), h("span", { class: "faint small" }, [s.origin, s.path, s.base && `BASE ${s.base}`].filter(Boolean).join(", "))),
+    h("td", { class: "num" }, bytes(s.files.reduce((n, f) => n + f.bytes, 0))),
+    h("td", {}, button("✕", () => shell.do(async () => { await del(`${shell.project.path}/scans/${s.number}`); await shell.project.load(["scans", "alignment"]); }), { class: "ghost tiny", "aria-label": `Delete scan ${s.number}`, key: `del-${s.number}` })))))));
+}
+
+/** Where scans are dropped; also used for inspection scans. */
+export function drop(shell, local, fixedPath = null) {
+  const input = h("input", { type: "file", class: "hidden", multiple: true, onchange: () => send(shell, local, [...input.files], fixedPath) });
+  const choice = (name, value, options) => h("select", { name, "aria-label": name, style: { width: "auto" }, onchange: (e) => { local[name] = e.target.value; } }, options.map(([v, text]) => h("option", { value: v, selected: v === value }, text)));
+  const box = h("div", { class: "drop" }, "Drop the readings here", h("span", { class: "faint small" }, "CSV, Parquet, HDF5, MFMC, NDE, PLY, PCD; or poses and readings as two files"),
+    h("div", { class: "row tight" }, !fixedPath && choice("path", local.path, [["alignment", "alignment scan"], ["inspection", "inspection scan"], ["corrected", "corrected inspection"]]), choice("base", local.base, [["", "BASE: the file says"], ["nominal", "BASE: nominal"], ["corrected", "BASE: corrected"]])),
+    button("Choose files", () => input.click()), input);
+  box.addEventListener("dragover", (e) => { e.preventDefault(); box.classList.add("over"); });
+  box.addEventListener("dragleave", () => box.classList.remove("over"));
+  box.addEventListener("drop", (e) => { e.preventDefault(); send(shell, local, [...e.dataTransfer.files], fixedPath); });
+  return box;
+}
+
+function send(shell, local, files, fixedPath) {
+  if (!files.length) return null;
+  return shell.do(async () => {
+    const job = upload("POST", `${shell.project.path}/scans`, files.map((f) => ["file", f]), { base: local.base, path: fixedPath ?? local.path }, (share, sent, total) => { local.progress = { share, text: `${bytes(sent)} of ${bytes(total)}`, cancel: job.cancel }; shell.draw(); });
+    try { await job.promise; } finally { local.progress = null; }
+    await shell.project.load(["scans", "alignment"]);
+  });
+}
+
+function colours(shell, scans) {
+  if (!scans?.length) return null;
+  const by = shell.local.colour ?? "standoff";
+  const set = (value) => { shell.local.colour = value; shell.view.send({ scan_by: value }); };
+  return h("div", { class: "stack" }, h("h3", {}, "Colour of the points"), h("div", { class: "row tight", role: "group" }, [["standoff", "Standoff"], ["amplitude", "Amplitude"]].map(([k, text]) => button(text, () => set(k), { class: by === k ? "on" : "", "aria-pressed": String(by === k) }))));
+}
+
+/** An offset as a fixture leaves it: normal, with the sigmas of the cell, rounded. */
+export function draw(setup) {
+  const normal = () => Math.sqrt(-2 * Math.log(1 - Math.random())) * Math.cos(2 * Math.PI * Math.random());
+  return () => Object.fromEntries(AXES.map((a) => [a, Number((normal() * (isAngle(a) ? setup.fixture.sigma_deg : setup.fixture.sigma_mm)).toFixed(isAngle(a) ? 2 : 1))]));
+}
+
+/** Ask for the hidden truth and run the simulated scanner. */
+export async function rehearse(shell, path) {
+  const body = await askRehearsal(path, draw(shell.project.data.setup));
+  if (body) { shell.local.truth = body.offset; await shell.do(async () => { await shell.project.run("/simulate", body); await shell.view.refresh(); }); }
+}
+
+export function footer(shell) {
+  const { scans, plan } = shell.project.data;
+  const busy = shell.busy("simulate");
+  const able = plan?.programs?.alignment?.available;
+  const go = button(busy ? "Rehearsing…" : "Rehearse the alignment scan", () => rehearse(shell, "alignment"), { class: scans?.length ? "tiny" : "primary", disabled: !able || busy, key: "rehearse" });
+  return scans?.length ? [go, button("Continue: align", () => { location.hash = `#/p/${shell.project.id}/alignment`; }, { class: "primary" })] : go;
+}
+
+export function drawer(shell) {
+  const { scans } = shell.project.data;
+  if (!scans?.length) return { tabs: [], stamp: "" };
+  const chart = (name) => get(`${shell.project.path}/charts/${name}`);
+  return { stamp: String(scans.at(-1).number), tabs: [
+    { key: "cscan", title: "C-scan", draw: async (body, alive) => maps(body, alive, await Promise.all([chart("cscan?of=amplitude"), chart("cscan?of=distance")])) },
+    { key: "bscan", title: "B-scan", draw: async (body, alive) => { const first = await chart("bscan?law=1"); return profile(body, alive, first.laws > 2 ? await chart(`bscan?law=${Math.round(first.laws / 2)}`) : first); } },
+    { key: "histograms", title: "Histograms", draw: async (body, alive) => histograms(body, alive, await chart("deviation"), await chart("amplitude")) },
+  ] };
+}
