@@ -47,8 +47,8 @@ class Envelope:
 def clearance_mm(solid: Solid, Ts_part_tcp: Transform, envelope: Envelope) -> tuple[Array, Array]:
     """Return the clearance of nozzle and of wrist (n,) each, mm, at n TCP poses.
 
-    The nozzle's is a lower bound (on a flat part by up to radius^2 / length below the truth); below `NEAR_MM` it is the
-    distance of the nearest part points found from the cylinder, negative by their depth inside it. The wrist's is a
+    The nozzle's is a lower bound (on a flat part by up to radius^2 / length below the truth); below `NEAR_MM` it is
+    measured on the nearest part points found, to about 0.2 mm, negative by their depth inside the cylinder. The wrist's is a
     lower bound too, up to `WRIST_STRIDE_MM` below the truth, and exact where it is less than that. Without a nozzle or a
     wrist it is infinite. Poses with the TCP in the material have the nozzle's depth, negative.
     """

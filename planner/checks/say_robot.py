@@ -96,7 +96,7 @@ def _advice(robot: Robot, path: ToolPath, setup: Setup) -> str:
     share = "all" if move.share >= 1.0 else f"{100.0 * move.share:.0f} %"
     return (
         f"Move the part by about X {x:.0f}, Y {y:.0f}, Z {z:.0f} mm in world (or the robot the other way): {share} of the"
-        " sampled poses are in reach there."
+        " poses are in reach there."
     )
 
 

@@ -3,11 +3,13 @@
 from dataclasses import dataclass
 
 import numpy as np
+from numpy.typing import NDArray
 from scipy.spatial.transform import RigidTransform
 
 from planner.frames import Array, Transform
 from planner.robot.kinematics import inverse
 from planner.robot.model import Robot
+from planner.robot.reach import reach
 
 SAMPLE_POSES = 60
 # Half widths of the grids as shares of the robot's reach, coarse first; each searches about the best so far.
@@ -16,7 +18,7 @@ GRIDS = ((1.0, 7), (0.25, 5), (0.08, 5))
 
 @dataclass(frozen=True, eq=False)
 class Move:
-    """A shift of the part (3,), mm, in robroot axes, and the share of sampled poses the robot then reaches, 0..1."""
+    """A shift of the part (3,), mm, in robroot axes, and the share of the poses the robot then reaches, 0..1."""
 
     shift_robroot_mm: Array
     share: float
@@ -27,12 +29,10 @@ def better_place(robot: Robot, Ts_robroot_flange: Transform) -> Move:
 
     Of equal shares the one with more margin to the axis limits wins, less 1 deg of it for every 100 mm of shift.
     """
-    n = len(Ts_robroot_flange)
-    rows = np.unique(np.linspace(0, n - 1, min(n, SAMPLE_POSES)).round().astype(np.intp))
-    poses = Ts_robroot_flange[rows]
+    poses = Ts_robroot_flange[_sample(Ts_robroot_flange.xyz_mm)]
     # The first grid is centred where the middle of the path would stand at half reach in front of the robot.
     home = np.array([0.6 * robot.reach_mm, 0.0, robot.file.opw.c1_mm]) - poses.xyz_mm.mean(axis=0)
-    best, best_score, best_share = home, -np.inf, 0.0
+    best, best_score = home, -np.inf
     for half, count in GRIDS:
         line = np.linspace(-half, half, count) * robot.reach_mm * 0.5
         grid = np.stack(np.meshgrid(line, line, line, indexing="ij"), axis=-1).reshape(-1, 3) + best
@@ -40,12 +40,21 @@ def better_place(robot: Robot, Ts_robroot_flange: Transform) -> Move:
         score = shares * 1e3 + margins - np.linalg.norm(grid, axis=1) * 0.01
         top = int(np.argmax(score))
         if score[top] > best_score:
-            best, best_score, best_share = grid[top], float(score[top]), float(shares[top])
-    return Move(best.round(0), best_share)
+            best, best_score = grid[top], float(score[top])
+    best = best.round(0)
+    moved = Transform.from_parts("robroot", "flange", Ts_robroot_flange.rotation, Ts_robroot_flange.xyz_mm + best)
+    return Move(best, reach(robot, moved).share)
+
+
+def _sample(xyz_mm: Array) -> NDArray[np.intp]:
+    """Return some poses spread over the path, and those that lie farthest out in each direction."""
+    n = len(xyz_mm)
+    spread = np.linspace(0, n - 1, min(n, SAMPLE_POSES)).round().astype(np.intp)
+    return np.unique(np.concatenate([spread, xyz_mm.argmin(axis=0), xyz_mm.argmax(axis=0)]))
 
 
 def _try(robot: Robot, poses: Transform, shifts: Array) -> tuple[Array, Array]:
-    """Return for each shift (k, 3) the reachable share of its best branch and that branch's median margin (deg)."""
+    """Return for each shift (k, 3) the reachable share of its best branch and that branch's least margin (deg)."""
     k, n = len(shifts), len(poses)
     xyz = (poses.xyz_mm[None] + shifts[:, None]).reshape(-1, 3)
     rotation = type(poses.rotation).concatenate([poses.rotation] * k)
@@ -59,4 +68,4 @@ def _try(robot: Robot, poses: Transform, shifts: Array) -> tuple[Array, Array]:
     share = (margin >= 0.0).mean(axis=1)
     branch = share.argmax(axis=1)
     chosen = margin[np.arange(k), :, branch]
-    return share[np.arange(k), branch], np.clip(np.median(chosen, axis=1), -30.0, 30.0)
+    return share[np.arange(k), branch], np.clip(chosen.min(axis=1), -30.0, 30.0)

@@ -106,6 +106,6 @@ def test_what_cannot_fix_a_base_is_said(cad: np.ndarray, points: np.ndarray, cod
 
 def test_any_rotation_between_cad_and_world() -> None:
     for rotation in Rotation.random(50, rng=np.random.default_rng(5)):
-        there = rotation.apply(CAD) + [5.0, -3.0, 900.0]
+        there = rotation.apply(CAD) + np.array([5.0, -3.0, 900.0])
         fit = fit_base(CAD, there, Transform.identity("base", "partnom"))
         assert np.abs(fit.T_world_base.rotation_matrix - rotation.as_matrix()).max() < 1e-10
