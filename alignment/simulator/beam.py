@@ -12,6 +12,8 @@ from planner.setup import Probe
 WIDTH_SIGMAS = 2.0 * np.sqrt(2.0 * np.log(2.0))
 REACH_SIGMAS = 5.0
 NEAR_SEGMENTS = 24
+# A foot this close to the rim counts as just inside: rounding must not put it inside one edge and outside the next.
+RIM_MM = 1e-7
 
 
 def beam_sigma_mm(probe: Probe) -> float:
@@ -74,17 +76,27 @@ def _near_rim(
     length = np.maximum(np.linalg.norm(edge, axis=2), 1e-12)
     along = edge / length[:, :, None]
     inward = np.cross(np.broadcast_to(z, along.shape), along)
-    # h: signed distance of the foot inside the edge line; ta, tb: ends of the edge along its line, from the foot.
-    h = -np.einsum("nkj,nkj->nk", a, inward)
-    ta, tb = np.einsum("nkj,nkj->nk", a, along), np.einsum("nkj,nkj->nk", b, along)
-    gap = np.hypot(h, np.maximum(0.0, np.maximum(ta, -tb)))
-    gap[~valid] = np.inf
+    h, ta, tb, gap = _seen(a, b, along, inward, valid)
     nearest = gap.min(axis=1, keepdims=True)
-    tied = gap <= nearest + 1e-7
+    tied = gap <= nearest + RIM_MM
+    # On the rim itself rounding could put the foot inside one edge and outside the next: it is moved inside both.
+    into = np.where((tied & (nearest < RIM_MM))[:, :, None], inward, 0.0).sum(axis=1, keepdims=True)
+    if into.any():
+        h, ta, tb, gap = _seen(a - 2.0 * RIM_MM * into, b - 2.0 * RIM_MM * into, along, inward, valid)
     inside = np.where(tied, h / np.maximum(gap, 1e-12), 0.0).sum(axis=1) >= 0.0
-    size = np.maximum(np.abs(h), 1e-9)
+    size = np.maximum(np.abs(h), 1e-12)
     tail = np.sign(h) * (owens_t(size / sigma_mm, tb / size) - owens_t(size / sigma_mm, ta / size))
     share = inside - np.where(valid, tail, 0.0).sum(axis=1)
     # Within rounding of the rim, inside and h may disagree; the two answers are exactly one apart.
     share = np.where(share > 1.2, share - 1.0, np.where(share < -0.2, share + 1.0, share))
     return np.asarray(np.clip(share, 0.0, 1.0))
+
+
+def _seen(
+    a: Array, b: Array, along: Array, inward: Array, valid: NDArray[np.bool_]
+) -> tuple[Array, Array, Array, Array]:
+    """How a foot sees rim segments from a to b: h, its distance inside their line; both ends along it; the distance."""
+    h = -np.einsum("nkj,nkj->nk", a, inward)
+    ta, tb = np.einsum("nkj,nkj->nk", a, along), np.einsum("nkj,nkj->nk", b, along)
+    gap = np.where(valid, np.hypot(h, np.maximum(0.0, np.maximum(ta, -tb))), np.inf)
+    return h, ta, tb, gap

@@ -8,6 +8,7 @@ from alignment.simulator.truth import Field
 from planner.frames import Array
 from planner.surface.inspection import InspectionSurface
 
+LEAST_SAMPLES = 40_000
 FieldName = Literal["bend", "twist", "dent", "step", "bend-twist"]
 
 
@@ -19,8 +20,10 @@ def spring_back_field(surface: InspectionSurface, name: FieldName, largest_mm: f
     """
     centre = surface.centroid_part
     corners = surface.vertices[surface.faces]
-    middles = corners.mean(axis=1) - centre
-    scatter = (middles * surface.face_areas_mm2[:, None]).T @ middles
+    # Second moments of the area: of a triangle, a twelfth of it times (9 m m^T + the sum of v v^T over its corners).
+    v, m = corners - centre, corners.mean(axis=1) - centre
+    area = surface.face_areas_mm2
+    scatter = 9.0 * np.einsum("f,fi,fj->ij", area, m, m) + np.einsum("f,fki,fkj->ij", area, v, v)
     axes = np.linalg.eigh(scatter)[1]
     long, wide = axes[:, 2], axes[:, 1]
     half_long = float(np.abs((surface.vertices - centre) @ long).max())
@@ -41,8 +44,15 @@ def spring_back_field(surface: InspectionSurface, name: FieldName, largest_mm: f
 
     if name not in ("bend", "twist", "dent", "step", "bend-twist"):
         raise ValueError(f"unknown spring-back field '{name}'")
-    samples = np.concatenate(
-        [surface.vertices, corners.mean(axis=1), 0.5 * (corners + np.roll(corners, 1, axis=1)).reshape(-1, 3)]
-    )
+    samples = _samples(corners)
     scale = largest_mm / float(np.abs(raw(samples)).max())
     return lambda points: scale * raw(np.asarray(points, dtype=np.float64))
+
+
+def _samples(corners: Array) -> Array:
+    """Points all over triangles (f, 3, 3), some tens of thousands, corners included: the largest of a field is among them."""
+    n = max(2, int(np.ceil(np.sqrt(2.0 * LEAST_SAMPLES / len(corners)))))
+    i, j = np.meshgrid(np.arange(n + 1), np.arange(n + 1), indexing="ij")
+    inside = i + j <= n
+    bary = np.stack([i[inside], j[inside], n - i[inside] - j[inside]], axis=1) / n
+    return np.einsum("sk,fkj->fsj", bary, corners).reshape(-1, 3)

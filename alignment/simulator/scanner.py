@@ -3,7 +3,7 @@
 import numpy as np
 
 from alignment.scan import Scan
-from alignment.simulator.body import true_body
+from alignment.simulator.body import TrueBody, true_body
 from alignment.simulator.disturb import actual_poses, streams, wander
 from alignment.simulator.echo import echoes
 from alignment.simulator.fields import spring_back_field
@@ -33,12 +33,14 @@ def simulate(
     noise: Noise = REFERENCE_NOISE,
     seed: int = 0,
     T_world_active: Transform | None = None,
+    body: TrueBody | None = None,
 ) -> Scan:
     """Return the scan that the program takes of the true part.
 
     program: poses as read back from the exported KRL. T_world_active: the BASE it runs in (`T_world_basecorr` of a
     corrected program); None: the nominal one, and then the scan does not name it. The recorded pose is the commanded
     one; the actual one, from which the echo comes, differs by the pose noise and the latency. Same seed, same scan.
+    body: what `true_shape(surface, truth)` returned, to build it once for many scans of one shape.
     """
     if surface.part is not part:
         raise ValueError("the inspection surface is not one of this part")
@@ -53,7 +55,7 @@ def simulate(
     T_part_active = part_from_correction(truth.T_base_basecorr, setup.T_base_partnom).inv() @ _active(
         setup, T_world_active
     )
-    body = true_body(surface, _field(surface, truth.spring_back), truth.surface)
+    body = true_shape(surface, truth) if body is None else body
     t_pose = motion.seconds(s)
     fired_s = t_pose[:, None] + noise.latency_ms * 1e-3 + (sweep_s if noise.prf_hz else np.zeros(1))
     distance, amplitude = np.full((len(s), len(laws_tcp)), np.nan), np.zeros((len(s), len(laws_tcp)))
@@ -64,6 +66,11 @@ def simulate(
         distance[rows], amplitude[rows] = echoes(body, *_beams(frames, fired_s[rows].shape, laws_tcp), setup, noise)
     times = t_pose[:, None] + sweep_s
     return record(distance, amplitude, motion.poses(s), pass_id, times, setup, truth, noise, random, T_world_active)
+
+
+def true_shape(surface: InspectionSurface, truth: Truth) -> TrueBody:
+    """Return the true part of a truth, in `part`: it depends on the spring-back, not on where the part is."""
+    return true_body(surface, _field(surface, truth.spring_back), truth.surface)
 
 
 def _frames(
