@@ -46,7 +46,9 @@ class CurvedSurface:
         positions[self._welded] = self._vertices
         self._welded_faces = self._welded[self._faces]
         fit = fit_vertices(positions, self._welded_faces, self.footprint_mm)
-        self.vertex_fit = VertexFit(*(getattr(fit, n)[self._welded] for n in ("points", "normals", "shape")))
+        w = self._welded
+        points = self._vertices if fit.exact else fit.points[w]
+        self.vertex_fit = VertexFit(points, fit.normals[w], fit.shape[w], fit.exact)
 
     @cached_property
     def _tree(self) -> igl.AABB:

@@ -12,12 +12,14 @@ from numpy.typing import NDArray
 from scipy.sparse import csr_array, eye_array
 
 from planner.frames import Array
+from planner.surface.clusters import Clusters
+from planner.surface.least_squares import one_sided, residual_slope, solve_segments
 from planner.surface.normals import tangent_frames
 
-# A polynomial that few neighbours leave open takes the smallest coefficients: relative to the trace of its equations.
-RIDGE = np.array([1e-12, 1e-12, 1e-12, 1e-9, 1e-9, 1e-9, 1e-6, 1e-6, 1e-6, 1e-6])
 # Neighbours turned by more than about this (rad) count little: a quadric does not describe a fillet end to end.
 TURN = 0.35
+# Beyond this residual (rad) a polynomial does not describe both sides of a node: the curvature jumps there.
+KINK_RAD = 0.004
 CHUNK_PAIRS = 400_000
 
 
@@ -52,20 +54,18 @@ def monomials(u: Array, v: Array, terms: int) -> Array:
     return np.stack(rows)
 
 
-def fit_nodes(
-    mean: Array, spread: Array, count: Array, normals: Array, rings: csr_array, nodes: NDArray[np.int64], exact: bool
-) -> LocalFit:
-    """Return the local polynomials of `nodes` (n,) over their `rings`.
+def fit_nodes(clusters: Clusters, rings: csr_array, nodes: NDArray[np.int64], terms: int, exact: bool) -> LocalFit:
+    """Return the local polynomials of `nodes` (n,) over their `rings`, with 6 terms (quadric) or 10 (cubic).
 
-    mean (c, 3), spread (c, 6), count (c,), normals (c, 3): clusters. exact: the nodes are points of the true surface, so
-    a cubic goes through them; else a quadric is fitted and the node's own noise is averaged with its neighbours'.
+    exact: the nodes are points of the true surface, and the polynomial goes through them; else the node's own noise is
+    averaged with its neighbours'.
     """
     pieces = []
     sizes = np.diff(rings.indptr)[nodes]
     bounds = np.searchsorted(np.cumsum(sizes), np.arange(CHUNK_PAIRS, int(sizes.sum()) + CHUNK_PAIRS, CHUNK_PAIRS))
     start = 0
     for stop in np.unique(np.r_[np.minimum(bounds + 1, len(nodes)), len(nodes)]):
-        pieces.append(_fit(mean, spread, count, normals, rings, nodes[start:stop], exact))
+        pieces.append(_fit(clusters, rings, nodes[start:stop], terms, exact))
         start = int(stop)
     names = LocalFit.__dataclass_fields__
     return LocalFit(*(np.concatenate([getattr(p, name) for p in pieces]) for name in names))
@@ -78,15 +78,13 @@ def _pairs(rings: csr_array, nodes: NDArray[np.int64]) -> tuple[NDArray[np.int64
     return np.asarray(rings.indices[np.repeat(rings.indptr[nodes], sizes) + within], dtype=np.int64), starts
 
 
-def _fit(
-    mean: Array, spread: Array, count: Array, normals: Array, rings: csr_array, nodes: NDArray[np.int64], exact: bool
-) -> LocalFit:
+def _fit(clusters: Clusters, rings: csr_array, nodes: NDArray[np.int64], terms: int, exact: bool) -> LocalFit:
     other, starts = _pairs(rings, nodes)
     sizes = np.diff(np.r_[starts, len(other)])
     row = np.repeat(np.arange(len(nodes)), sizes)
-    normal = normals[nodes]
+    normal = clusters.normals[nodes]
     first, second = tangent_frames(normal)
-    d = mean[other] - mean[nodes[row]]
+    d = clusters.mean[other] - clusters.mean[nodes[row]]
     f, s, m = first[row], second[row], normal[row]
     u, v, h = (np.einsum("ij,ij->i", d, axis) for axis in (f, s, m))
     distance = np.sqrt(u * u + v * v + h * h)
@@ -94,29 +92,34 @@ def _fit(
     scale[scale == 0] = 1.0
     k = scale[row]
     rho = distance / k
-    turn2 = 2.0 * (1.0 - np.einsum("ij,ij->i", normals[other], m))
-    one_ring = np.minimum.reduceat(np.where(rho > 0, rho, 1.0), starts)[row]
-    if exact:
-        weight = 1.0 / (rho + 0.3 * one_ring) ** 4 * np.exp(-turn2 / (2.0 * TURN) ** 2)
-    else:
-        weight = count[other] * (1.05 - rho * rho) ** 2 * np.exp(-turn2 / TURN**2)
-    terms = 10 if exact else 6
+    turn2 = 2.0 * (1.0 - np.einsum("ij,ij->i", clusters.normals[other], m))
     phi = monomials(u / k, v / k, terms)
-    if not exact and spread.any():
-        phi[3] += _quadratic(spread[other], f, f) / k**2
-        phi[4] += _quadratic(spread[other], f, s) / k**2
-        phi[5] += _quadratic(spread[other], s, s) / k**2
     if exact:
+        nearest = np.minimum.reduceat(np.where(rho > 0, rho, 1.0), starts)[row]
+        weight = np.exp(-turn2 / (2.0 * TURN) ** 2) / (rho + 0.3 * nearest) ** 4
         phi[0] = 0.0
-    coefficients = _solve(phi, h / k, weight, starts)
-    residual = h / k - np.einsum("tn,nt->n", phi, coefficients[row])
-    far = rho > 0
-    slope2 = np.add.reduceat(np.where(far, weight * residual**2 / np.where(far, rho * rho, 1.0), 0.0), starts)
-    slope_rms = np.sqrt(slope2 / np.add.reduceat(np.where(far, weight, 1e-300), starts))
+    else:
+        weight = clusters.count[other] * (1.05 - rho * rho) ** 2 * np.exp(-turn2 / TURN**2)
+        if clusters.spread.any():
+            spread = clusters.spread[other]
+            phi[3] += _quadratic(spread, f, f) / k**2
+            phi[4] += _quadratic(spread, f, s) / k**2
+            phi[5] += _quadratic(spread, s, s) / k**2
+    h /= k
+    coefficients = solve_segments(phi, h, weight, starts)
+    slope = residual_slope(phi, h, rho, coefficients[row])
+    slope_rms = np.sqrt(np.add.reduceat(slope * slope, starts) / np.maximum(sizes - 1, 1))
+    if exact:
+        jumps = np.flatnonzero(slope_rms > KINK_RAD)
+        if len(jumps):
+            pair = np.concatenate([np.arange(starts[j], starts[j] + sizes[j]) for j in jumps])
+            coefficients[jumps] = one_sided(
+                phi[:, pair], h[pair], weight[pair], rho[pair], sizes[jumps], coefficients[jumps]
+            )
     full = np.zeros((len(nodes), 10))
     powers = np.array([0, 1, 1, 2, 2, 2, 3, 3, 3, 3])[:terms]
     full[:, :terms] = coefficients * scale[:, None] ** (1.0 - powers)
-    return LocalFit(mean[nodes], first, second, normal, full, slope_rms)
+    return LocalFit(clusters.mean[nodes], first, second, normal, full, slope_rms)
 
 
 def _quadratic(tensor: Array, a: Array, b: Array) -> Array:
@@ -127,20 +130,3 @@ def _quadratic(tensor: Array, a: Array, b: Array) -> Array:
         + a[:, 1] * (xy * b[:, 0] + yy * b[:, 1] + yz * b[:, 2])
         + a[:, 2] * (xz * b[:, 0] + yz * b[:, 1] + zz * b[:, 2])
     )
-
-
-def _solve(phi: Array, h: Array, weight: Array, starts: NDArray[np.int64]) -> Array:
-    """Return weighted least-squares coefficients (n, terms) of segments that begin at `starts`."""
-    terms = len(phi)
-    matrix = np.zeros((len(starts), terms, terms))
-    right = np.zeros((len(starts), terms))
-    for i in range(terms):
-        weighted = weight * phi[i]
-        right[:, i] = np.add.reduceat(weighted * h, starts)
-        for j in range(i, terms):
-            matrix[:, i, j] = np.add.reduceat(weighted * phi[j], starts)
-            matrix[:, j, i] = matrix[:, i, j]
-    trace = np.einsum("nii->n", matrix) / terms
-    diagonal = np.arange(terms)
-    matrix[:, diagonal, diagonal] += RIDGE[:terms] * np.maximum(trace, 1e-30)[:, None]
-    return np.asarray(np.linalg.solve(matrix, right[..., None])[..., 0])

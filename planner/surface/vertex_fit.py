@@ -4,48 +4,99 @@ from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.sparse import csr_array
+from scipy.sparse import csr_array, eye_array
 
 from planner.frames import Array
-from planner.surface.clusters import cluster
+from planner.surface.clusters import Clusters, cluster
 from planner.surface.normals import angle_weighted_normals, unit
 from planner.surface.quadric import LocalFit, fit_nodes, monomials, two_rings
-from planner.surface.topology import Index, edges_of
+from planner.surface.topology import Index, edges_of, vertex_graph
+
+# Edges longer than this share of the footprint: the mesh, not the probe, sets the neighbourhood.
+COARSE = 0.8
+# A quadric through CAD vertices leaves less than this (rad, median) where edges are shorter than the footprint.
+NOISE_RAD = 0.004
+NOISE_SAMPLE = 3000
+# Neighbours that a cubic wants.
+ENOUGH = 16
 
 
 @dataclass(frozen=True, eq=False)
 class VertexFit:
-    """points (v, 3) mm, unit normals (v, 3), shape (v, 3, 3): symmetric W with dn = W dp, 1/mm."""
+    """points (v, 3) mm, unit normals (v, 3), shape (v, 3, 3): symmetric W with dn = W dp, 1/mm. exact: through the vertices."""
 
     points: Array
     normals: Array
     shape: Array
+    exact: bool
 
 
 def fit_vertices(vertices: Array, faces: Index, footprint_mm: float) -> VertexFit:
     """Return the smooth surface at welded vertices (v, 3) of faces (f, 3), from neighbours within about the footprint.
 
-    Where edges are longer than the footprint the mesh is taken as CAD: its vertices are points of the surface and stay.
+    Vertices of a CAD tessellation are points of the true surface: they stay, and the polynomials go through them. A mesh
+    finer than the footprint whose vertices scatter about such polynomials was measured: there the footprint averages.
     """
     edges = edges_of(faces).vertices
     guess = angle_weighted_normals(vertices, faces)
-    clusters = cluster(vertices, guess, edges, footprint_mm)
-    rings = two_rings(clusters.graph)
-    exact = _mean_link_mm(clusters.graph, clusters.mean) > 0.8 * footprint_mm
-    exact &= clusters.count == 1
-    of_vertex = clusters.of_vertex
-    normals, points = np.zeros_like(vertices), np.zeros_like(vertices)
-    shape = np.zeros((len(vertices), 3, 3))
-    for flag in (True, False):
-        nodes = np.flatnonzero(exact == flag)
+    points = Clusters(
+        np.arange(len(vertices)),
+        np.ones(len(vertices)),
+        vertices,
+        np.zeros((len(vertices), 6)),
+        guess,
+        vertex_graph(len(vertices), edges),
+    )
+    coarse = _mean_link_mm(points.graph, vertices) > COARSE * footprint_mm
+    if _is_noisy(points, np.flatnonzero(~coarse)):
+        return _smooth(vertices, cluster(vertices, guess, edges, footprint_mm))
+    return _through(points, coarse)
+
+
+def _is_noisy(points: Clusters, fine: NDArray[np.int64]) -> bool:
+    """Return whether neighbours scatter about quadrics through the vertices: a scanned mesh, not a CAD one."""
+    if len(fine) < 100:
+        return False
+    sample = fine[:: max(len(fine) // NOISE_SAMPLE, 1)]
+    near = (points.graph + eye_array(len(points.mean), dtype=np.int8, format="csr")).tocsr()
+    rows = (near[sample] @ near).tocsr()
+    fit = fit_nodes(points, _as_rows(rows, sample, len(points.mean)), sample, 6, exact=True)
+    return bool(np.median(fit.slope_rms) > NOISE_RAD)
+
+
+def _through(points: Clusters, coarse: NDArray[np.bool_]) -> VertexFit:
+    """Return the fit of a CAD mesh: through every vertex; cubic where the mesh is coarser than the footprint."""
+    rings = two_rings(points.graph)
+    few = coarse & (np.diff(rings.indptr) < ENOUGH)
+    n = len(points.mean)
+    normals, shape = np.zeros((n, 3)), np.zeros((n, 3, 3))
+    for chosen, terms in ((~coarse, 6), (coarse & ~few, 10), (few, 10)):
+        nodes = np.flatnonzero(chosen)
         if not len(nodes):
             continue
-        fit = fit_nodes(clusters.mean, clusters.spread, clusters.count, clusters.normals, rings, nodes, flag)
-        row = np.full(len(exact), -1)
-        row[nodes] = np.arange(len(nodes))
-        mine = np.flatnonzero(exact[of_vertex] == flag)
-        points[mine], normals[mine], shape[mine] = evaluate_fit(fit, row[of_vertex[mine]], vertices[mine])
-    return VertexFit(points, normals, shape)
+        around = rings
+        if chosen is few:
+            # At corners and edges two rings do not fix a cubic.
+            near = (points.graph + eye_array(n, dtype=np.int8, format="csr")).tocsr()
+            around = _as_rows((rings[nodes] @ near).tocsr(), nodes, n)
+        fit = fit_nodes(points, around, nodes, terms, exact=True)
+        _, normals[nodes], shape[nodes] = evaluate_fit(fit, np.arange(len(nodes)), points.mean[nodes])
+    return VertexFit(points.mean, normals, shape, exact=True)
+
+
+def _smooth(vertices: Array, clusters: Clusters) -> VertexFit:
+    """Return the fit of a noisy mesh: quadrics over clusters within the footprint, vertices moved onto them."""
+    nodes = np.arange(len(clusters.mean))
+    fit = fit_nodes(clusters, two_rings(clusters.graph), nodes, 6, exact=False)
+    return VertexFit(*evaluate_fit(fit, clusters.of_vertex, vertices), exact=False)
+
+
+def _as_rows(rows: csr_array, nodes: NDArray[np.int64], n: int) -> csr_array:
+    """Return a matrix (n, n) with `rows` at the places of `nodes`, ascending, and nothing elsewhere."""
+    sizes = np.zeros(n, dtype=np.int64)
+    sizes[nodes] = np.diff(rows.indptr)
+    rows.sort_indices()
+    return csr_array((rows.data, rows.indices, np.r_[0, np.cumsum(sizes)]), shape=(n, n))
 
 
 def _mean_link_mm(graph: csr_array, mean: Array) -> Array:
