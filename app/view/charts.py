@@ -113,4 +113,6 @@ def _scanned(model: ProjectModel) -> PointCloud:
 
 def _json(values: Array) -> list[Any]:
     rounded = np.round(values, 4)
-    return np.where(np.isfinite(rounded), rounded, None).tolist()
+    plain = rounded.astype(object)
+    plain[~np.isfinite(rounded)] = None
+    return list(plain.tolist())

@@ -16,11 +16,11 @@ Rgb = NDArray[np.uint8]
 MapName = Literal["sequential", "diverging"]
 
 ACCENT = (17, 94, 163)
-ACCENT_SOFT = (152, 190, 224)
-STEEL = (176, 182, 188)
+ACCENT_SOFT = (138, 180, 218)
+STEEL = (158, 165, 172)
 EDGE = (58, 66, 74)
 FAINT = (150, 158, 166)
-UNKNOWN = (120, 124, 128)
+UNKNOWN = (196, 199, 202)
 VERDICT = {"good": (28, 138, 73), "warn": (214, 138, 0), "bad": (200, 40, 40), "none": (96, 104, 112)}
 
 _ACES_IN = np.array([[0.59719, 0.35458, 0.04823], [0.076, 0.90834, 0.01566], [0.0284, 0.13383, 0.83777]])

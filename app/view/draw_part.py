@@ -13,6 +13,7 @@ from planner.part import Faces, Part
 from planner.surface.inspection import InspectionSurface
 
 M = 1e-3
+FOV_RAD = 0.6
 
 
 @dataclass(frozen=True, eq=False)
@@ -61,7 +62,8 @@ def prepare(server: viser.ViserServer) -> dict[str, viser.FrameHandle]:
     """Add lights, camera defaults and the empty tree of frames and layers; return the frames by name."""
     server.scene.configure_default_lights(enabled=True, cast_shadow=False)
     server.scene.set_up_direction("+z")
-    server.initial_camera.fov = 0.6
+    server.scene.configure_environment_map(environment_intensity=0.45)
+    server.initial_camera.fov = FOV_RAD
     server.initial_camera.near = 0.01
     server.initial_camera.far = 200.0
     frames = {name: server.scene.add_frame(name, show_axes=False) for name in FRAMES}

@@ -35,7 +35,7 @@ STEPS: dict[str, tuple[str, ...]] = {
     "paths": ("cad", "inspection", "keypoints", "probe"),
     "programs": ("cad", "alignment", "keypoints"),
     "scan": ("cad", "keypoints", "scan"),
-    "alignment": ("cad", "keypoints", "after"),
+    "alignment": ("found", "after", "keypoints"),
     "report": ("found", "after"),
 }
 

@@ -12,6 +12,7 @@ from app.view.browsers import Browser, Browsers
 from app.view.cameras import Sight, sight, towards
 from app.view.clicks import Clicks
 from app.view.commands import ViewCommand, ViewState
+from app.view.draw_part import FOV_RAD
 from app.view.edits import without
 from app.view.history import History, Points
 from app.view.layers import LAYERS
@@ -181,7 +182,7 @@ class ProjectView:
                 ),
             )
         else:
-            self._move(browser, sight("iso" if view == "surface" else view, points, camera.fov, aspect))
+            self._move(browser, sight("iso" if view == "surface" else view, points, FOV_RAD, aspect))
 
     def _focus(self, browser: Browser, name: str) -> None:
         found = next((p for p in self.model.keypoints().points if p.id == name), None)
