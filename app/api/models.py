@@ -1,0 +1,185 @@
+"""What the routes take and give, with an example each. Files that DESIGN fixes (setup, key points) are not wrapped."""
+
+from typing import Annotated, Any, Literal
+
+from pydantic import AfterValidator, BaseModel, ConfigDict, Field
+
+from planner.setup import Mm, Pose
+
+
+class Body(BaseModel):
+    """A request body: unknown fields are refused."""
+
+    model_config = ConfigDict(extra="forbid", use_attribute_docstrings=True, allow_inf_nan=False)
+
+
+class Answer(BaseModel):
+    """An answer."""
+
+    model_config = ConfigDict(use_attribute_docstrings=True, from_attributes=True)
+
+
+class NewProject(Body):
+    """A project to make."""
+
+    name: str = Field(examples=["Skin panel 7"])
+    sample: Literal["aerofoil", "flat-plate"] | None = None
+    """Start with a sample part and its cell."""
+
+
+class ProjectChange(Body):
+    """What can be changed of a project."""
+
+    name: str = Field(examples=["Skin panel 7, left"])
+
+
+class Project(Answer):
+    """A project."""
+
+    id: str = Field(examples=["5f1c0a9b2d3e4f5a6b7c"])
+    name: str = Field(examples=["Skin panel 7"])
+    version: int
+    """Counts the changes of the project itself; its ETag."""
+    created: str = Field(examples=["2026-03-01T08:00:00.000Z"])
+    changed: str = Field(examples=["2026-03-01T09:30:00.000Z"])
+
+
+class PartInfo(Answer):
+    """The part in force, or what is known of it."""
+
+    version: int
+    name: str = Field(examples=["panel.step"])
+    unit: str = Field(examples=["mm"])
+    sha256: str
+    """Of the file as uploaded."""
+    bytes: int
+    triangles: int
+    extents_mm: list[float] = Field(examples=[[150.0, 100.0, 10.0]])
+    size_if: dict[str, list[float]]
+    """Its size in mm if the numbers of the file were meant in each unit: a check of the unit."""
+    chord_error_mm: float | None
+    """Estimated distance of the triangles from the true surface; null if unknown."""
+    notes: list[str]
+
+
+class Point(Body):
+    """A point in CAD coordinates (mm)."""
+
+    x_mm: Mm
+    y_mm: Mm
+    z_mm: Mm
+
+
+class Surface(Body):
+    """How the inspection surface is chosen: flooded from these points to the creases; none: the largest one."""
+
+    seeds: list[Point] = Field(default=[], max_length=64)
+
+
+Share = Annotated[float, Field(ge=0.0, lt=1.0)]
+
+
+class Rehearsal(Body):
+    """A run on the simulated scanner: where the real part hides, and what goes wrong on the way."""
+
+    offset: Pose = Pose()
+    """Hidden `T_base_basecorr`."""
+    spring_back_mm: float = Field(0.0, ge=-100.0, le=100.0)
+    """Largest displacement of the surface along its normal."""
+    seed: int = Field(0, ge=0, le=2**31 - 1)
+    path: Literal["alignment", "inspection", "corrected"] = "alignment"
+    outliers: Share = 0.0
+    dropouts: Share = 0.0
+    latency_ms: float = Field(0.0, ge=-1000.0, le=1000.0)
+
+
+def _once(numbers: list[int] | None) -> list[int] | None:
+    if numbers is not None and len(set(numbers)) != len(numbers):
+        raise ValueError("a scan is named twice")
+    return numbers
+
+
+class AlignmentRequest(Body):
+    """How to align."""
+
+    scans: Annotated[list[int] | None, AfterValidator(_once)] = Field(None, min_length=1, max_length=64)
+    """Numbers of the scans; null: the newest one of the alignment path."""
+    method: Literal["map", "keypoints"] = "map"
+    edges: bool | None = None
+    """Null: wherever the scan crosses them."""
+    non_rigid: bool = False
+    base: Literal["nominal", "corrected"] | None = None
+    """BASE that was active, for files that cannot say; null: as said with the upload."""
+
+
+class Acceptance(Body):
+    """Who takes a result over, and why."""
+
+    name: str = Field(examples=["A. Inspector"])
+    reason: str = Field(examples=["Root-side residual explained by the known form error; confirmed with the gauge."])
+
+
+class AssessmentRequest(Body):
+    """Which inspection scan to judge."""
+
+    scan: int | None = Field(None, ge=1)
+    """Number of the inspection scan; null: the newest."""
+    before: int | None = Field(None, ge=1)
+    """Number of the one from before the correction."""
+
+
+class Scan(Answer):
+    """A scan."""
+
+    number: int
+    origin: Literal["uploaded", "simulated"]
+    base: str | None
+    """BASE that was active, where the file cannot say."""
+    path: str | None
+    """Path it was taken on, if known."""
+    files: list[dict[str, Any]] = Field(examples=[[{"name": "scan.csv", "bytes": 1048576, "sha256": "…"}]])
+    detail: dict[str, Any]
+    created: str
+
+
+class Job(Answer):
+    """A piece of slow work."""
+
+    id: str
+    project_id: str
+    kind: Literal["plan", "suggest", "simulate", "alignment", "assessment"]
+    state: Literal["queued", "running", "done", "failed", "cancelled"]
+    fraction: float
+    text: str
+    result: dict[str, Any] | None
+    """What it made, as `{"number": n}`."""
+    issues: list[dict[str, Any]]
+    error: dict[str, Any] | None = None
+    """For a failed job, the same as in an error answer."""
+    created: str
+    changed: str
+
+
+class PlanInfo(BaseModel):
+    """plan.json, whether it is still of the inputs in force, and which programs can be had."""
+
+    model_config = ConfigDict(extra="allow")
+    number: int
+    verdict: str
+    stale: bool
+    stale_because: list[str]
+    programs: dict[str, Any]
+    created: str
+
+
+class AlignmentInfo(BaseModel):
+    """correction.json, whether it is still of the inputs in force, and whether its program can be had."""
+
+    model_config = ConfigDict(extra="allow")
+    number: int
+    verdict: Literal["pass", "partial", "fail"]
+    stale: bool
+    stale_because: list[str]
+    accepted: dict[str, Any] | None
+    program: dict[str, Any]
+    created: str

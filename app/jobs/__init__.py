@@ -1,0 +1,1 @@
+"""Slow work: pure functions run in worker processes (or on a Dask cluster), with progress and cancellation."""

@@ -1,0 +1,68 @@
+"""Results: plans, alignments and assessments, each bound to the digests of what it was made from."""
+
+from typing import Any
+
+from sqlalchemy import func, select
+from sqlalchemy.orm import Session
+
+from app.store.blobs import Blob
+from app.store.content import digest_of_files
+from app.store.inputs import add_files
+from app.store.journal import note
+from app.store.names import clean_text, now
+from app.store.projects import get, touch
+from app.store.refusal import not_found
+from app.store.tables import ResultRow
+
+
+def add(
+    session: Session, project_id: str, kind: str, files: dict[str, Blob], inputs: dict[str, Any], options: dict[str, Any],
+    verdict: str, summary: dict[str, Any],
+) -> ResultRow:  # fmt: skip
+    """Add a result with its files."""
+    get(session, project_id)
+    of_kind = (ResultRow.project_id == project_id, ResultRow.kind == kind)
+    highest = session.scalar(select(func.max(ResultRow.number)).where(*of_kind))
+    sha256 = digest_of_files((name, blob.sha256) for name, blob in files.items())
+    row = ResultRow(
+        project_id=project_id, kind=kind, number=(highest or 0) + 1, sha256=sha256, inputs=inputs, options=options,
+        verdict=verdict, summary=summary, accepted=None, created=now(),
+    )  # fmt: skip
+    session.add(row)
+    add_files(session, project_id, f"{kind}:{row.number}", files)
+    note(session, project_id, f"{kind}-made", number=row.number, sha256=sha256, verdict=verdict, inputs=inputs)
+    touch(session, project_id)
+    return row
+
+
+def latest(session: Session, project_id: str, kind: str) -> ResultRow | None:
+    """Return the newest result of a kind."""
+    of_kind = select(ResultRow).where(ResultRow.project_id == project_id, ResultRow.kind == kind)
+    return session.scalars(of_kind.order_by(ResultRow.number.desc()).limit(1)).first()
+
+
+def get_result(session: Session, project_id: str, kind: str, number: int) -> ResultRow:
+    """Return a result; raises Refusal 404."""
+    found = (ResultRow.project_id == project_id, ResultRow.kind == kind, ResultRow.number == number)
+    row = session.scalars(select(ResultRow).where(*found)).first()
+    if row is None:
+        raise not_found(kind, number)
+    return row
+
+
+def all_results(session: Session, project_id: str, kind: str) -> list[ResultRow]:
+    """Return the results of a kind, oldest first."""
+    of_kind = select(ResultRow).where(ResultRow.project_id == project_id, ResultRow.kind == kind)
+    return list(session.scalars(of_kind.order_by(ResultRow.number)))
+
+
+def accept(session: Session, row: ResultRow, name: str, reason: str) -> None:
+    """Record who takes a result over, why, and which bytes it was."""
+    accepted = {
+        "name": clean_text(name, "name"),
+        "reason": clean_text(reason, "reason", 1000),
+        "at": now(),
+        "sha256": row.sha256,
+    }
+    row.accepted = accepted
+    note(session, row.project_id, f"{row.kind}-accepted", number=row.number, **accepted)

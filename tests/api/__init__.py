@@ -1,0 +1,1 @@
+"""Tests of the REST interface, its server and its safety."""

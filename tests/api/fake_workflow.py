@@ -1,0 +1,135 @@
+"""A workflow of known answers and controllable speed, so that the tests are about the server and not about geometry.
+
+The wishes travel in the part's file name: `slow` takes until it is cancelled, `deaf` never listens, `crash` ends its process,
+`fault` raises what nobody expects, `refused` says why it cannot.
+"""
+
+import hashlib
+import json
+import os
+import signal
+import time
+from dataclasses import dataclass
+from pathlib import Path
+from types import SimpleNamespace
+
+import numpy as np
+
+from planner.errors import fail
+from planner.keypoint import KeyPoint
+from planner.part import Part, Provenance
+from planner.setup import Setup
+from planner.surface.inspection import InspectionSurface
+
+PROGRAM = b"&ACCESS RVP\r\nDEF EB_TEST()\r\nINI\r\nEND\r\n".replace(b"INI\r\n", b"")
+
+
+@dataclass(frozen=True)
+class PlanRequest:
+    source: Path
+    name: str
+    unit: str | None
+    setup: Setup
+    keypoints: tuple[KeyPoint, ...]
+    seeds_part: tuple[tuple[float, float, float], ...]
+
+
+@dataclass(frozen=True)
+class SimulateOptions:
+    offset: tuple[float, ...]
+    spring_back_mm: float
+    seed: int
+    path: str
+    outliers: float
+    dropouts: float
+    latency_ms: float
+
+
+@dataclass(frozen=True)
+class AlignOptions:
+    method: str
+    edges: bool | None
+    non_rigid: bool
+    base: str | None
+
+    @classmethod
+    def from_folder(cls, folder, **options):
+        return cls(**options)
+
+
+def open_part(source: Path, name: str, unit: str | None) -> Part:
+    content = source.read_bytes()
+    if name.endswith(".stl") and unit is None:
+        raise fail("unit-missing", "the file has no unit; it would be 10 mm or 254 mm long.", "Say its unit.", name)
+    if b"broken" in content:
+        raise fail("cad-broken", "the file is damaged.", "Export it again.", name)
+    scale = {"mm": 1.0, "cm": 10.0, "m": 1000.0, "inch": 25.4, None: 1.0}[unit]
+    vertices = np.array([[0, 0, 0], [10, 0, 0], [10, 5, 0], [0, 5, 0]], dtype=np.float64) * scale
+    faces = np.array([[0, 1, 2], [0, 2, 3]], dtype=np.int32)
+    return Part(vertices, faces, Provenance(name, hashlib.sha256(content).hexdigest(), unit or "mm"), 0.0)
+
+
+def choose_surface(part, setup, seeds=()):
+    return InspectionSurface(part, np.arange(len(part.faces), dtype=np.int32))
+
+
+def suggest_keypoints(part, setup, seeds=()):
+    return [KeyPoint(id=f"K{i}", x_mm=float(i), y_mm=1.0, z_mm=0.0) for i in range(1, 4)]
+
+
+def plan(request: PlanRequest, progress):
+    progress(0.1, "reading the part")
+    _obey(request.name, progress)
+    points = list(request.keypoints) or suggest_keypoints(None, None)
+    listed = [p.model_dump() for p in points]
+    text = json.dumps([request.setup.model_dump(mode="json"), listed, request.source.read_bytes().hex()[:64]])
+    program = PROGRAM.replace(b"EB_TEST", b"EB_" + hashlib.sha256(text.encode()).hexdigest()[:8].upper().encode())
+    sha = hashlib.sha256(program).hexdigest()
+    issues = []
+    programs = {f"{kind}/EB_TEST.src": program for kind in ("alignment", "inspection")}
+    if "unreachable" in request.name:
+        programs.pop("inspection/EB_TEST.src")
+        issues = [{"severity": "error", "code": "reach", "message": "out of reach.", "remedy": "Move it.", "where": "pass 1"}]
+    record = {"files": {"EB_TEST.src": {"sha256": "0" * 64 if "unproven" in request.name else sha}}}
+    content = {"keypoints": listed, "issues": issues, "alignment": {"program": record}, "inspection": {"program": record}}
+    artifacts = {"plan.json": json.dumps(content).encode(), "keypoints.json": json.dumps(listed).encode()}
+    progress(1.0, "planned")
+    return None, artifacts | programs
+
+
+def simulate(folder: Path, options: SimulateOptions, output: Path, progress) -> int:
+    program = sorted((folder / options.path).glob("*.src"))[0]
+    output.write_text(f"x_mm,tof_us\n{options.offset[0]},{options.seed}\n# {program.name}\n")
+    return 1
+
+
+def align(folder: Path, scans, options: AlignOptions, progress):
+    text = " ".join(p.read_text(errors="replace") for p in scans)
+    verdict = next((v for v in ("fail", "partial") if f"want-{v}" in text), "pass")
+    six = {"x_mm": 1.0, "y_mm": 0.0, "z_mm": 0.0, "a_deg": 0.0, "b_deg": 0.0, "c_deg": 0.0}
+    sha = hashlib.sha256(PROGRAM).hexdigest()
+    issues = [{"severity": "error", "code": "bad", "message": "too far.", "remedy": "", "where": ""}] if verdict == "fail" else []
+    correction = {"verdict": verdict, "method": options.method, "correction": six, "keypoints": [], "issues": issues, "program": sha}
+    artifacts = {"correction/correction.json": json.dumps(correction).encode(), "correction/report.html": b"<p>report</p>"}
+    if verdict != "fail":
+        artifacts["corrected/EB_TEST.src"] = PROGRAM
+    return SimpleNamespace(correction=correction, artifacts=artifacts)
+
+
+def assess(folder: Path, scan: Path, before: Path | None, progress):
+    content = {"after": {"within_2db": 1.0}, "before": None, "improvement_pct": None}
+    return SimpleNamespace(content=content, artifacts={"assessment.json": json.dumps(content).encode()}, issues=())
+
+
+def _obey(name: str, progress) -> None:
+    if "refused" in name:
+        raise fail("no-surface", "there is no surface.", "Choose one.", "surface")
+    if "fault" in name:
+        raise ZeroDivisionError("nobody expected this")
+    if "crash" in name:
+        os.kill(os.getpid(), signal.SIGKILL)
+    while "deaf" in name:
+        time.sleep(0.05)
+    for step in range(10_000 if "slow" in name else 0):
+        progress(0.1 + step * 1e-5, "working")
+        time.sleep(0.02)
