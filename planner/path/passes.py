@@ -131,6 +131,6 @@ def _leads(frames: Transform, at: Ints, end: Ints, inward: int, spacing_mm: floa
     """Return lead poses of every pass, nearest first."""
     count = max(int(np.ceil(LEAD_MM / spacing_mm)), 2)
     steps = np.tile(-inward * LEAD_MM * np.arange(1, count + 1) / count, (len(at), 1))
-    inside = max(int(round(4.0 / spacing_mm)), 2)
+    inside = max(round(4.0 / spacing_mm), 2)
     toward = np.where(inward > 0, np.minimum(at + inside, end), np.maximum(at - inside, end))
     return extrapolate(frames, at, toward, steps, _LEAD_TURN_RAD)

@@ -23,7 +23,7 @@ from planner.toolpath import ToolPath
 MOST_POSES = 5_000_000
 GEOMETRY_SPACING_MM = 5.0
 """Dense poses stand no farther apart than this, however sparse the acquisition, so that they describe the surface."""
-_SMOOTHING_MM = 10.0
+_SMOOTHING_MM = 20.0
 _SHARP_DEG = 30.0
 
 
@@ -44,7 +44,11 @@ def raster(curved: CurvedSurface, setup: Setup) -> ToolPath:
     mesh = PathMesh.of(surface)
     cut = (plane_cut if inspection.strategy == "plane" else geodesic_cut)(curved, mesh, axes, setup)
     spacing = acquisition_spacing_mm(setup)
-    track = tracks(cut.mesh, cut.chains, spacing, inspection.edge_margin_mm)
+    # Where a track comes nearer to an edge than this, its neighbour covers everything up to the margin.
+    swath = setup.probe.swath_mm
+    step = inspection.step_mm if inspection.step_mm is not None else (1.0 - inspection.overlap) * swath
+    floor = inspection.edge_margin_mm - max(step - swath / 2.0, 0.0)
+    track = tracks(cut.mesh, cut.chains, spacing, inspection.edge_margin_mm, floor)
     if len(track.run) > MOST_POSES:
         raise fail(
             "raster-too-dense",

@@ -9,9 +9,6 @@ from planner.frames import Array
 from planner.path.isolines import Chains, Ints
 from planner.path.mesh import PathMesh
 
-# Shorter passes than this have no direction; what they would have covered is reported as missed.
-_SHORTEST_MM = 0.5
-
 
 @dataclass(frozen=True, eq=False)
 class Tracks:
@@ -51,7 +48,7 @@ class Tracks:
 
 
 @dataclass(frozen=True, eq=False)
-class _Lengths:
+class Lengths:
     """Chains with their arc length: start (c,) and total (c,) of each chain on one running axis, end (m,) of segments."""
 
     chains: Chains
@@ -62,21 +59,24 @@ class _Lengths:
     total: Array
 
 
-def tracks(mesh: PathMesh, chains: Chains, spacing_mm: float, margin_mm: float) -> Tracks:
-    """Resample chains at equal spacing (at most `spacing_mm`), their open ends cut back to the margin.
+def tracks(mesh: PathMesh, chains: Chains, spacing_mm: float, margin_mm: float, floor_mm: float = 0.0) -> Tracks:
+    """Resample chains at equal spacing (at most `spacing_mm`), kept away from the boundary of the surface.
 
-    Each open end is cut to the first place that is `margin_mm` away from the boundary of the surface; a track that
-    passes a hole sideways is not cut there. Loops keep their whole length and end where they began.
+    Each pass begins and ends at the first place that is `margin_mm` away from the boundary. Between its ends a track may
+    come nearer, as one that passes a hole sideways does, but no nearer than `floor_mm`: there it is cut in two. Loops that
+    are nowhere cut keep their whole length and end where they began.
     """
-    lengths = _measure(mesh, chains)
-    s0, s1 = np.zeros(len(chains.level)), lengths.total.copy()
+    lengths = measure(mesh, chains)
+    which = np.arange(len(chains.level))
+    s0, s1, closed = np.zeros(len(which)), lengths.total.copy(), chains.closed
     if margin_mm > 0.0 and len(mesh.boundary_edges):
-        s0, s1 = _within_margin(mesh, lengths, min(spacing_mm, margin_mm / 2.0), margin_mm)
-    keep = s1 - s0 >= min(_SHORTEST_MM, spacing_mm)
-    return _resample(mesh, lengths, s0, s1, keep, spacing_mm)
+        which, s0, s1, closed = _within_margin(mesh, lengths, min(spacing_mm, margin_mm / 2.0), margin_mm, floor_mm)
+    keep = s1 - s0 >= spacing_mm * (1.0 - 1e-9)
+    return resample(lengths, which[keep], s0[keep], s1[keep], closed[keep], spacing_mm)
 
 
-def _measure(mesh: PathMesh, chains: Chains) -> _Lengths:
+def measure(mesh: PathMesh, chains: Chains) -> Lengths:
+    """Return the chains with their segments' ends in space and their arc lengths."""
     corner = mesh.vertices[mesh.faces[chains.face]]
     a, b = (np.einsum("mk,mkj->mj", x, corner) for x in (chains.bary_in, chains.bary_out))
     length = np.linalg.norm(b - a, axis=1)
@@ -84,55 +84,64 @@ def _measure(mesh: PathMesh, chains: Chains) -> _Lengths:
     head = np.searchsorted(chains.chain, np.arange(len(chains.level)))
     tail = np.searchsorted(chains.chain, np.arange(len(chains.level)), side="right") - 1
     start = end[head] - length[head]
-    return _Lengths(chains, a, b, end, start, end[tail] - start)
+    return Lengths(chains, a, b, end, start, end[tail] - start)
 
 
-def _resample(
-    mesh: PathMesh, lengths: _Lengths, s0: Array, s1: Array, keep: NDArray[np.bool_], spacing: float
+def resample(
+    lengths: Lengths, which: Ints, s0: Array, s1: Array, closed: NDArray[np.bool_], spacing_mm: float
 ) -> Tracks:
+    """Return equally spaced points on the intervals s0..s1 (k,), mm, of the chains `which` (k,)."""
     chains = lengths.chains
-    which = np.flatnonzero(keep)
-    pieces = np.maximum(np.ceil((s1 - s0)[which] / spacing - 1e-9), 1.0).astype(np.int64)
+    pieces = np.maximum(np.ceil((s1 - s0) / spacing_mm - 1e-9), 1.0).astype(np.int64)
     run = np.repeat(np.arange(len(which)), pieces + 1)
     rank = np.arange(len(run)) - np.repeat(np.cumsum(pieces + 1) - (pieces + 1), pieces + 1)
     chain = which[run]
-    s = lengths.start[chain] + s0[chain] + (s1 - s0)[chain] * rank / pieces[run]
-    head = np.searchsorted(chains.chain, np.arange(len(chains.level)))
-    tail = np.searchsorted(chains.chain, np.arange(len(chains.level)), side="right") - 1
+    s = lengths.start[chain] + s0[run] + (s1 - s0)[run] * rank / pieces[run]
+    numbers = np.arange(len(chains.level))
+    head = np.searchsorted(chains.chain, numbers)
+    tail = np.searchsorted(chains.chain, numbers, side="right") - 1
     seg = np.clip(np.searchsorted(lengths.end, s, side="left"), head[chain], tail[chain])
     length = np.linalg.norm(lengths.b[seg] - lengths.a[seg], axis=1)
-    t = np.clip(1.0 - np.divide(lengths.end[seg] - s, length, out=np.zeros_like(s), where=length > 0), 0.0, 1.0)
-    bary = chains.bary_in[seg] * (1.0 - t)[:, None] + chains.bary_out[seg] * t[:, None]
-    points = lengths.a[seg] * (1.0 - t)[:, None] + lengths.b[seg] * t[:, None]
-    return Tracks(
-        chains.face[seg].astype(np.int32), bary, points, run.astype(np.int64), chains.level[which], chains.closed[which]
-    )
+    t = np.clip(1.0 - np.divide(lengths.end[seg] - s, length, out=np.zeros_like(s), where=length > 0), 0.0, 1.0)[
+        :, None
+    ]
+    bary = chains.bary_in[seg] * (1.0 - t) + chains.bary_out[seg] * t
+    points = lengths.a[seg] * (1.0 - t) + lengths.b[seg] * t
+    return Tracks(chains.face[seg].astype(np.int32), bary, points, run.astype(np.int64), chains.level[which], closed)
 
 
-def _within_margin(mesh: PathMesh, lengths: _Lengths, spacing: float, margin: float) -> tuple[Array, Array]:
-    """Return where on each chain the margin is first and last kept, from its ends; an empty interval if it never is."""
+def _within_margin(
+    mesh: PathMesh, lengths: Lengths, spacing: float, margin: float, floor: float
+) -> tuple[Ints, Array, Array, NDArray[np.bool_]]:
+    """Return the intervals of chains to travel: chain, from, to (mm), and whether it is a whole loop."""
     chains = lengths.chains
-    everything = np.ones(len(chains.level), dtype=bool)
-    probe = _resample(mesh, lengths, np.zeros_like(lengths.total), lengths.total, everything, spacing)
+    everything = np.arange(len(chains.level))
+    probe = resample(lengths, everything, np.zeros_like(lengths.total), lengths.total, chains.closed, spacing)
     distance = np.minimum(mesh.boundary_distance(probe.points, margin * 1.5), margin * 1.5)
     first, last = probe.bounds()
-    step = lengths.total / np.maximum(last - first, 1)
+    step = (lengths.total / np.maximum(last - first, 1))[probe.run]
     inside = distance >= margin
-    rows = np.arange(len(inside))
-    n = len(inside)
-    low = np.full(len(step), n, dtype=np.int64)
-    high = np.full(len(step), -1, dtype=np.int64)
-    np.minimum.at(low, probe.run[inside], rows[inside])
-    np.maximum.at(high, probe.run[inside], rows[inside])
-    ok = high >= 0
-    low, high = np.where(ok, low, first), np.where(ok, high, first)
-    before, after = np.maximum(low - 1, first), np.minimum(high + 1, last)
+    allowed = distance >= floor
+    whole = chains.closed & (np.minimum.reduceat(allowed, first) > 0)
+    new = np.concatenate([[True], np.diff(probe.run) > 0])
+    begins = new | np.concatenate([[False], allowed[1:] & ~allowed[:-1]])
+    piece = np.cumsum(begins) - 1
+    n, pieces = len(inside), int(piece[-1]) + 1
+    good = np.flatnonzero(inside & allowed)
+    low, high = np.full(pieces, n, dtype=np.int64), np.full(pieces, -1, dtype=np.int64)
+    np.minimum.at(low, piece[good], good)
+    np.maximum.at(high, piece[good], good)
+    # A piece runs on to the end of its chain after it has come too near: cut it at the last allowed sample.
+    has = high >= 0
+    low, high = low[has], high[has]
+    chain = probe.run[low]
+    before, after = np.maximum(low - 1, first[chain]), np.minimum(high + 1, last[chain])
     back = _fraction(distance[low], distance[before], margin)
     ahead = _fraction(distance[high], distance[after], margin)
-    s0 = (low - first - back * (low - before)) * step
-    s1 = (high - first + ahead * (after - high)) * step
-    loop = chains.closed
-    return np.where(loop, 0.0, s0), np.where(loop, lengths.total, np.where(ok, s1, s0 - 1.0))
+    s0 = (low - first[chain] - back * (low - before)) * step[low]
+    s1 = (high - first[chain] + ahead * (after - high)) * step[high]
+    loop = whole[chain]
+    return chain, np.where(loop, 0.0, s0), np.where(loop, lengths.total[chain], s1), loop
 
 
 def _fraction(inside: Array, outside: Array, margin: float) -> Array:

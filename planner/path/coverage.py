@@ -1,0 +1,188 @@
+"""What the array sweeps of the surface, and what of that within tolerance; in mm2."""
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.spatial import cKDTree
+
+from planner.frames import Array
+from planner.path.isolines import Ints
+from planner.path.mesh import PathMesh
+from planner.path.sampling import Samples, sample_every_face
+from planner.setup import Setup
+from planner.surface.curved import CurvedSurface
+from planner.toolpath import ToolPath
+
+_SAMPLES = 120_000
+_CANDIDATES = 12
+_EPS_MM = 1e-6
+
+
+@dataclass(frozen=True, eq=False)
+class Coverage:
+    """Areas of the inspection surface, mm2: whole, swept, swept within tolerance, missed (not swept within tolerance).
+
+    swept_share, within_share: 0..1 of the whole. margin_mm2: the part of the missed area that lies in the edge margin,
+    where no pass was asked for. face_share, face_within_share (k,): the same per triangle of the surface, for drawing.
+    """
+
+    area_mm2: float
+    swept_mm2: float
+    swept_share: float
+    within_tolerance_mm2: float
+    within_share: float
+    missed_mm2: float
+    margin_mm2: float
+    face_share: Array
+    face_within_share: Array
+
+    @property
+    def share(self) -> float:
+        """Swept share of the surface, 0..1: the coverage of an alignment scan."""
+        return self.swept_share
+
+
+@dataclass(frozen=True, eq=False)
+class _Poses:
+    """DATA poses: points, normals, travel, array axes (n, 3); first, last (n,): rows where their run of data begins, ends;
+    spacing (n,): mean distance of the poses of that run."""
+
+    points: Array
+    normals: Array
+    travel: Array
+    arrays: Array
+    first: Ints
+    last: Ints
+    spacing: Array
+
+
+def coverage(curved: CurvedSurface, path: ToolPath, setup: Setup) -> Coverage:
+    """Return what the DATA motion of a path covers of the surface.
+
+    Swept: within half a swath (laws x pitch; the beam of a single crystal) either side of the way from one DATA pose to
+    the next of the same pass, overlaps once, only what lies on the surface. Within tolerance: there the law that fires at
+    the point meets the surface within `tolerances.tilt_deg`, at a standoff within `tolerances.standoff_mm` of the TCP's.
+    Measured at some hundred thousand evenly spread points, at least one in each triangle; several passes over a point
+    count by the best.
+    """
+    surface = curved.surface
+    samples = sample_every_face(surface, _SAMPLES)
+    points, normals = curved.evaluate(samples.face, samples.bary)
+    swept = np.zeros(len(points), dtype=bool)
+    within = np.zeros(len(points), dtype=bool)
+    poses = _poses(path)
+    if poses is not None:
+        _sweep(points, normals, poses, setup, swept, within)
+    return _summary(curved, samples, points, swept, within, setup)
+
+
+def _poses(path: ToolPath) -> _Poses | None:
+    row = np.flatnonzero(path.is_data)
+    if not len(row):
+        return None
+    frames = path.Ts_part_contact[row]
+    axes, p = frames.rotation_matrix, frames.xyz_mm
+    new = np.concatenate([[True], (np.diff(row) > 1) | (np.diff(path.pass_id[row]) != 0)])
+    run = np.cumsum(new) - 1
+    start = np.flatnonzero(new)
+    end = np.append(start[1:], len(row)) - 1
+    step = np.concatenate([[0.0], np.linalg.norm(np.diff(p, axis=0), axis=1)])
+    step[new] = 0.0
+    mean = np.bincount(run, step) / np.maximum(end - start, 1)
+    return _Poses(p, axes[:, :, 2], axes[:, :, 0], axes[:, :, 1], start[run], end[run], np.maximum(mean, 1e-3)[run])
+
+
+def _sweep(
+    points: Array, normals: Array, poses: _Poses, setup: Setup, swept: NDArray[np.bool_], within: NDArray[np.bool_]
+) -> None:
+    """Mark the samples swept, and swept within tolerance: first by the nearest pose, then by all tracks in reach."""
+    half = setup.probe.swath_mm / 2.0
+    reach = 1.2 * half + float(poses.spacing.max())
+    tree = cKDTree(poses.points, balanced_tree=False, compact_nodes=False)
+    distance, near = tree.query(points, distance_upper_bound=reach, workers=2)
+    todo = np.flatnonzero(np.isfinite(distance))
+    _test(points, normals, todo, near[todo], poses, setup, swept, within)
+    todo = todo[~within[todo]]
+    if not len(todo):
+        return
+    rank = np.arange(len(poses.first)) - poses.first
+    stride = np.maximum(np.floor(half / 2.0 / poses.spacing), 1.0).astype(np.int64)
+    thin = np.flatnonzero((rank % stride == 0) | (np.arange(len(rank)) == poses.last))
+    k = min(_CANDIDATES, len(thin))
+    tree = cKDTree(poses.points[thin], balanced_tree=False, compact_nodes=False)
+    distance, near = tree.query(points[todo], k=k, distance_upper_bound=reach, workers=2)
+    distance, near = distance.reshape(len(todo), k), near.reshape(len(todo), k)
+    for c in range(k):
+        open_ = np.flatnonzero(np.isfinite(distance[:, c]) & ~within[todo])
+        if not len(open_):
+            continue
+        i = thin[near[open_, c]]
+        x = points[todo[open_]]
+        along = np.einsum("ij,ij->i", x - poses.points[i], poses.travel[i])
+        i = np.clip(i + np.round(along / poses.spacing[i]).astype(np.int64), poses.first[i], poses.last[i])
+        _test(points, normals, todo[open_], i, poses, setup, swept, within)
+
+
+def _test(
+    points: Array,
+    normals: Array,
+    sample: Ints,
+    pose: Ints,
+    poses: _Poses,
+    setup: Setup,
+    swept: NDArray[np.bool_],
+    within: NDArray[np.bool_],
+) -> None:
+    """Mark samples that lie under the motion from the poses to their successors, or from their predecessors."""
+    half = setup.probe.swath_mm / 2.0
+    least = np.cos(np.radians(setup.tolerances.tilt_deg))
+    for a, b in ((pose, np.minimum(pose + 1, poses.last[pose])), (np.maximum(pose - 1, poses.first[pose]), pose)):
+        x = points[sample]
+        # Between the planes of the two array positions: signed distances past the first and short of the second.
+        past = np.einsum("ij,ij->i", x - poses.points[a], poses.travel[a])
+        short = np.einsum("ij,ij->i", poses.points[b] - x, poses.travel[b])
+        between = (past >= -_EPS_MM) & (short >= -_EPS_MM) & (a != b)
+        s, i, j, x = sample[between], a[between], b[between], x[between]
+        f = (past[between] / np.maximum(past[between] + short[between], 1e-9)).clip(0.0, 1.0)[:, None]
+        off = x - (1.0 - f) * poses.points[i] - f * poses.points[j]
+        array = (1.0 - f) * poses.arrays[i] + f * poses.arrays[j]
+        up = (1.0 - f) * poses.normals[i] + f * poses.normals[j]
+        up /= np.linalg.norm(up, axis=1, keepdims=True)
+        height = np.einsum("ij,ij->i", off, up)
+        hit = (np.abs(np.einsum("ij,ij->i", off, array)) <= half) & (np.abs(height) <= half + setup.standoff_mm)
+        facing = np.einsum("ij,ij->i", up, normals[s])
+        hit &= facing > 0.0
+        swept[s[hit]] = True
+        good = hit & (facing >= least) & (np.abs(height) <= setup.tolerances.standoff_mm)
+        within[s[good]] = True
+
+
+def _summary(
+    curved: CurvedSurface,
+    samples: Samples,
+    points: Array,
+    swept: NDArray[np.bool_],
+    within: NDArray[np.bool_],
+    setup: Setup,
+) -> Coverage:
+    area = samples.area_mm2
+    total = float(area.sum())
+    margin = setup.inspection.edge_margin_mm
+    missed = np.flatnonzero(~within)
+    near = np.zeros(0)
+    if margin > 0.0 and len(missed):
+        near = area[missed][np.isfinite(PathMesh.of(curved.surface).boundary_distance(points[missed], margin))]
+    faces = len(curved.surface.part_faces)
+    whole = np.maximum(np.bincount(samples.face, area, faces), 1e-300)
+    return Coverage(
+        area_mm2=total,
+        swept_mm2=float(area[swept].sum()),
+        swept_share=float(area[swept].sum()) / total,
+        within_tolerance_mm2=float(area[within].sum()),
+        within_share=float(area[within].sum()) / total,
+        missed_mm2=float(area[missed].sum()),
+        margin_mm2=float(near.sum()),
+        face_share=np.bincount(samples.face, area * swept, faces) / whole,
+        face_within_share=np.bincount(samples.face, area * within, faces) / whole,
+    )
