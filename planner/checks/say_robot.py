@@ -89,8 +89,11 @@ def _say_reach(robot: Robot, path: ToolPath, setup: Setup, motion: RobotMotion, 
 def _advice(robot: Robot, path: ToolPath, setup: Setup) -> str:
     """Return where the part would be in reach, as a shift in world axes."""
     move = better_place(robot, path_flange_poses(path, setup))
-    if move.share < 1e-9:
-        return "No place in front of this robot brings the path into reach: check tool.tcp, or choose a larger robot."
+    if not move.shift_robroot_mm.any():
+        return (
+            "No shift of the part was found that brings more of the path into reach: turn the part, check tool.tcp, or"
+            " choose a larger robot."
+        )
     turn = setup.robot_root.transform("world", "robroot")
     x, y, z = turn.directions(move.shift_robroot_mm)
     share = "all" if move.share >= 1.0 else f"{100.0 * move.share:.0f} %"
