@@ -16,6 +16,8 @@ from app.store.tables import FileRow, ResultRow
 from planner.issues import Issue, errors_in
 
 OWNER = {"alignment": "plan", "inspection": "plan", "corrected": "alignment"}
+PROOF_IN = {"plan": ("plan.json",), "alignment": ("correction/correction.json", "correction/report.html")}
+"""Where a result keeps what was proven of its programs, with the SHA-256 of every file."""
 KRL = (".src", ".dat")
 
 
@@ -61,8 +63,10 @@ def permitted(session: Session, project_id: str, which: str) -> tuple[ResultRow,
 def hand_out(session: Session, blobs: BlobStore, project_id: str, which: str) -> Handout:
     """Return a program's exact, proven bytes; raises Refusal 409 for one that may not leave, 500 for damaged bytes."""
     row, rows = permitted(session, project_id, which)
+    own = files_of(session, project_id, f"{row.kind}:{row.number}")
+    proofs = (own[name] for name in (*PROOF_IN[row.kind], f"{which}/manifest.json") if name in own)
+    manifest = "".join(get_bytes(blobs, file.sha256).decode("utf-8", "replace") for file in proofs)
     files = {name: get_bytes(blobs, file.sha256) for name, file in rows.items()}
-    manifest = files.get("manifest.json", b"").decode("utf-8", "replace")
     programs = {name: content for name, content in files.items() if name.endswith(KRL)}
     unproven = [name for name in programs if rows[name].sha256 not in manifest]
     if unproven:

@@ -21,7 +21,7 @@ from planner.part import Part, Provenance
 from planner.setup import Setup
 from planner.surface.inspection import InspectionSurface
 
-PROGRAM = b"&ACCESS RVP\r\nDEF EB_TEST()\r\nINI\r\nEND\r\n".replace(b"INI\r\n", b"")
+PROGRAM = b"&ACCESS RVP\r\nDEF EB_TEST()\r\nEND\r\n"
 
 
 @dataclass(frozen=True)
@@ -83,7 +83,8 @@ def plan(request: PlanRequest, progress):
     points = list(request.keypoints) or suggest_keypoints(None, None)
     listed = [p.model_dump() for p in points]
     text = json.dumps([request.setup.model_dump(mode="json"), listed, request.source.read_bytes().hex()[:64]])
-    program = PROGRAM.replace(b"EB_TEST", b"EB_" + hashlib.sha256(text.encode()).hexdigest()[:8].upper().encode())
+    mark = hashlib.sha256(text.encode()).hexdigest()[:8].encode()
+    program = PROGRAM.replace(b"END\r\n", b"; " + mark + b"\r\nEND\r\n")
     sha = hashlib.sha256(program).hexdigest()
     issues = []
     programs = {f"{kind}/EB_TEST.src": program for kind in ("alignment", "inspection")}
