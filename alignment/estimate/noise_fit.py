@@ -1,0 +1,153 @@
+"""Hyper-parameters of the noise from the residuals themselves, and the posterior of the motion averaged over them.
+
+Restricted likelihood (H. D. Patterson, R. Thompson, Biometrika 58 (1971) 545, doi:10.1093/biomet/58.3.545) with weak
+log-normal priors; its mode by average-information steps (A. R. Gilmour, R. Thompson, B. R. Cullis, Biometrics 51 (1995)
+1440, doi:10.2307/2533274); then the posterior is the mixture over hyper-parameters drawn about the mode (importance
+sampling with a fixed Sobol set: same input, same bits). Correlation that is as long as the scan cannot be known from one
+scan; the mixture says so where plugging in the mode would not.
+"""
+
+from dataclasses import dataclass
+
+import numpy as np
+from scipy.linalg import LinAlgError, cho_solve, solve_triangular
+from scipy.stats import norm, qmc
+
+from alignment.estimate.noise_kernel import NAMES, Kernel
+from alignment.estimate.noise_rows import NoiseRows
+from planner.frames import Array
+
+DRAWS = 64
+STEPS = 25
+# The likelihood of the noise must not lean on where the part was expected: prior this many times wider.
+WIDE = 10.0
+PROPOSAL_WIDTH = 1.15
+
+
+@dataclass(frozen=True, eq=False)
+class NoisePrior:
+    """Log-normal priors: centre (9,) and spread (9,) of the logarithms, in the order of `noise_kernel.NAMES`."""
+
+    centre: Array
+    spread: Array
+
+
+def noise_prior(scatter_mm: float, part_size_mm: float) -> NoisePrior:
+    """Return what is believed before seeing a residual: a robot of 0.03 mm that wanders over some cm, a stiff part."""
+    centre = [scatter_mm, 0.03, 60.0, 60.0, 0.003, 0.003, 0.25 * part_size_mm, 0.1, 0.05]
+    spread = [0.7, 1.0, 1.6, 1.5, 1.0, 1.3, 0.8, 1.0, 1.0]
+    return NoisePrior(np.log(centre), np.array(spread))
+
+
+@dataclass(frozen=True, eq=False)
+class NoiseFit:
+    """Posterior over the hyper-parameters of one scan.
+
+    theta (9,): mode, logarithms of `NAMES`. draws (q, 9) and weights (q,): the mixture. effective: how many draws it is
+    worth.
+    """
+
+    theta: Array
+    draws: Array
+    weights: Array
+    effective: float
+
+    def named(self) -> dict[str, float]:
+        """Return the mode by name, mm."""
+        return {name: float(v) for name, v in zip(NAMES, np.exp(self.theta), strict=True)}
+
+
+def fit_noise(rows: NoiseRows, prior: NoisePrior, draws: int = DRAWS) -> NoiseFit:
+    """Return the noise of a scan from its residuals."""
+    kernel = Kernel(rows)
+    active = list(kernel.active)
+    theta = prior.centre.copy()
+    theta = _mode(kernel, rows, prior, theta)
+    information = _fisher(kernel, rows, theta) + np.diag(prior.spread[active] ** -2.0)
+    root = np.linalg.cholesky(np.linalg.inv(information))
+    unit = norm.ppf(qmc.Sobol(len(active), scramble=True, rng=np.random.default_rng(20260)).random(draws))
+    unit[0] = 0.0
+    samples = np.tile(theta, (draws, 1))
+    samples[:, active] += PROPOSAL_WIDTH * unit @ root.T
+    log_weight = np.array([_log_posterior(kernel, rows, prior, sample) for sample in samples])
+    log_weight += 0.5 * (unit**2).sum(axis=1)
+    weights = np.exp(log_weight - log_weight.max())
+    weights /= weights.sum()
+    return NoiseFit(theta, samples, weights, float(1.0 / (weights**2).sum()))
+
+
+def factor(k: Array) -> Array | None:
+    """Return the lower Cholesky factor, or None if K is not positive definite to rounding."""
+    try:
+        return np.linalg.cholesky(k)
+    except LinAlgError:
+        return None
+
+
+def _log_posterior(kernel: Kernel, rows: NoiseRows, prior: NoisePrior, theta: Array) -> float:
+    active = list(kernel.active)
+    lower = factor(kernel.covariance(theta))
+    if lower is None:
+        return -np.inf
+    xw, rw = (solve_triangular(lower, v, lower=True, check_finite=False) for v in (rows.x, rows.r))
+    inner = np.linalg.cholesky(xw.T @ xw + np.eye(rows.x.shape[1]) / WIDE**2)
+    explained = solve_triangular(inner, xw.T @ rw, lower=True)
+    value = -np.log(np.diag(lower)).sum() - np.log(np.diag(inner)).sum() - 0.5 * (rw @ rw - explained @ explained)
+    u = (theta[active] - prior.centre[active]) / prior.spread[active]
+    return float(value - 0.5 * u @ u)
+
+
+def _projector(rows: NoiseRows, k: Array) -> tuple[Array, float] | None:
+    """Return P = K^-1 - K^-1 X (X' K^-1 X + 1/wide^2)^-1 X' K^-1, and the log of its likelihood."""
+    lower = factor(k)
+    if lower is None:
+        return None
+    inverse = cho_solve((lower, True), np.eye(len(k)), check_finite=False)
+    kx = inverse @ rows.x
+    inner = rows.x.T @ kx + np.eye(rows.x.shape[1]) / WIDE**2
+    p = inverse - kx @ np.linalg.solve(inner, kx.T)
+    value = -np.log(np.diag(lower)).sum() - 0.5 * np.linalg.slogdet(inner)[1] - 0.5 * rows.r @ p @ rows.r
+    return p, float(value)
+
+
+def _mode(kernel: Kernel, rows: NoiseRows, prior: NoisePrior, theta: Array) -> Array:
+    """Climb to the mode by damped average-information steps."""
+    active = list(kernel.active)
+    precision = prior.spread[active] ** -2.0
+    damping, best, here = 1e-2, -np.inf, theta
+    step = np.zeros(len(active))
+    at: tuple[Array, Array] | None = None
+    for _ in range(STEPS):
+        trial = here.copy()
+        trial[active] += step
+        k, by = kernel.with_derivatives(trial)
+        found = _projector(rows, k)
+        u = trial[active] - prior.centre[active]
+        value = -np.inf if found is None else found[1] - 0.5 * (precision * u) @ u
+        if found is not None and value >= best - 1e-9:
+            gain = value - best
+            p, best, here = found[0], value, trial
+            pr = p @ rows.r
+            pulled = np.stack([d @ pr for d in by])
+            gradient = np.array([-0.5 * np.vdot(p, d) for d in by]) + 0.5 * pulled @ pr - precision * u
+            at = (gradient, 0.5 * pulled @ p @ pulled.T + np.diag(precision))
+            damping = max(damping * 0.3, 1e-4)
+            if gain < 1e-3 and np.abs(step).max() < 0.02:
+                break
+        else:
+            damping = max(damping, 0.1) * 5.0
+        if at is None or damping > 1e4:
+            break
+        gradient, information = at
+        step = np.linalg.solve(information + damping * np.diag(np.diag(information)), gradient)
+        step *= min(1.0, 1.5 / max(float(np.abs(step).max()), 1e-12))
+    return here
+
+
+def _fisher(kernel: Kernel, rows: NoiseRows, theta: Array) -> Array:
+    """Return the expected information tr(P Ki P Kj) / 2 of the active logarithms."""
+    k, by = kernel.with_derivatives(theta)
+    found = _projector(rows, k)
+    assert found is not None
+    turned = [found[0] @ d for d in by]
+    return np.array([[0.5 * np.vdot(a, b.T) for b in turned] for a in turned])

@@ -1,0 +1,135 @@
+"""Covariance of the residuals: nugget, a wandering robot, an array that tilts, form error of the part, and edges.
+
+Along the path the robot's error is an exponential (Ornstein-Uhlenbeck) process, the same for all laws of a pose; its
+tilt about the travel shows in proportion to the place on the array. Form error is an exponential field in space.
+Averages over stretches and cells are taken exactly (path) or closely (space), so that short correlations, which a
+condensed row cannot resolve, keep the power they have in the mean.
+"""
+
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+from scipy.spatial.distance import pdist, squareform
+
+from alignment.estimate.noise_rows import NoiseRows
+from planner.frames import Array
+
+NAMES = (
+    "nugget_mm",
+    "path_mm",
+    "path_length_mm",
+    "gap_mm",
+    "tilt_mm",
+    "field_mm",
+    "field_length_mm",
+    "edge_nugget_mm",
+    "edge_path_mm",
+)
+NUGGET, PATH, LENGTH, GAP, TILT, FIELD, FIELD_LENGTH, EDGE_NUGGET, EDGE_PATH = range(len(NAMES))
+# Mean distance between two points of a rectangle, per its diagonal (0.37 for a square).
+MEAN_DISTANCE = 0.37
+
+
+@dataclass(frozen=True, eq=False)
+class Kernel:
+    """Covariances of the rows of one scan for any hyper-parameters theta (9,): logarithms of `NAMES`."""
+
+    rows: NoiseRows
+
+    @cached_property
+    def _distance2(self) -> Array:
+        d = squareform(pdist(self.rows.position_base))
+        return d**2 + (MEAN_DISTANCE * self.rows.size_mm) ** 2
+
+    @cached_property
+    def _pass_step(self) -> Array:
+        """How many passes lie between two blocks."""
+        number = np.unique(self.rows.block_pass, return_inverse=True)[1]
+        return np.abs(number[:, None] - number[None, :]).astype(np.float64)
+
+    @cached_property
+    def _apart(self) -> Array:
+        """Path between the end of one block and the start of the other (b, b), mm."""
+        a, b = self.rows.block_from_mm, self.rows.block_to_mm
+        return np.maximum(np.maximum(a[:, None] - b[None, :], a[None, :] - b[:, None]), 0.0)
+
+    @cached_property
+    def _pair(self) -> tuple[Array, Array]:
+        """Products of places on the array (n, n) for surface rows, and which pairs are both edge rows."""
+        surface = ~self.rows.edge
+        across = np.where(surface, self.rows.across, 0.0)
+        edge = self.rows.edge.astype(np.float64)
+        return np.outer(across, across), np.outer(edge, edge)
+
+    @cached_property
+    def active(self) -> tuple[int, ...]:
+        """Hyper-parameters that these rows can feel."""
+        out = [NUGGET, FIELD, FIELD_LENGTH]
+        if self.rows.has_path:
+            out += [PATH, LENGTH, GAP]
+            if np.ptp(self.rows.across) > 0:
+                out.append(TILT)
+        if self.rows.edge.any():
+            out += [EDGE_NUGGET, EDGE_PATH]
+        return tuple(sorted(out))
+
+    def path_correlation(self, length_mm: float, gap_mm: float) -> Array:
+        """Return the correlation (n, n) of means over stretches of an exponential process along the path."""
+        width = (self.rows.block_to_mm - self.rows.block_from_mm) / length_mm
+        safe = np.maximum(width, 1e-9)
+        small = width < 1e-4
+        mean = np.where(small, 1.0 - 0.5 * width, -np.expm1(-safe) / safe)
+        own = np.where(small, 1.0 - width / 3.0, 2.0 * (safe + np.expm1(-safe)) / safe**2)
+        c = np.exp(-(self._apart + gap_mm * self._pass_step) / length_mm) * np.outer(mean, mean)
+        np.fill_diagonal(c, own)
+        return c[np.ix_(self.rows.block, self.rows.block)]
+
+    def field_correlation(self, length_mm: float) -> Array:
+        """Return the correlation (n, n) of the form error; edges measure something else."""
+        c = np.exp(-np.sqrt(self._distance2) / length_mm)
+        if self.rows.edge.any():
+            surface = (~self.rows.edge).astype(np.float64)
+            c = c * np.outer(surface, surface)
+        return c
+
+    def covariance(self, theta: Array) -> Array:
+        """Return K (n, n), mm2."""
+        k, _ = self._parts(theta, derivatives=False)
+        return k
+
+    def with_derivatives(self, theta: Array) -> tuple[Array, list[Array]]:
+        """Return K (n, n) and its derivatives by the logarithms of the active hyper-parameters."""
+        return self._parts(theta, derivatives=True)
+
+    def _parts(self, theta: Array, derivatives: bool) -> tuple[Array, list[Array]]:
+        v = np.exp(theta)
+        rows = self.rows
+        by: dict[int, Array] = {}
+        nugget = np.where(rows.edge, 0.0, v[NUGGET] ** 2 / rows.count)
+        diagonal = nugget.copy()
+        k = v[FIELD] ** 2 * self.field_correlation(v[FIELD_LENGTH])
+        if derivatives:
+            by[NUGGET] = np.diag(2.0 * nugget)
+            by[FIELD] = 2.0 * k
+            by[FIELD_LENGTH] = k * (np.sqrt(self._distance2) / v[FIELD_LENGTH])
+        if rows.has_path:
+            x, both = self._pair
+            surface = 1.0 - np.maximum(rows.edge[:, None], rows.edge[None, :])
+            scale = v[PATH] ** 2 * surface + v[TILT] ** 2 * x + v[EDGE_PATH] ** 2 * both
+            c = self.path_correlation(v[LENGTH], v[GAP])
+            k = k + scale * c
+            if derivatives:
+                by[PATH] = 2.0 * v[PATH] ** 2 * surface * c
+                by[TILT] = 2.0 * v[TILT] ** 2 * x * c
+                by[EDGE_PATH] = 2.0 * v[EDGE_PATH] ** 2 * both * c
+                h = 1e-4
+                by[LENGTH] = scale * (self.path_correlation(v[LENGTH] * np.exp(h), v[GAP]) - c) / h
+                by[GAP] = scale * (self.path_correlation(v[LENGTH], v[GAP] * np.exp(h)) - c) / h
+        if rows.edge.any():
+            edge = np.where(rows.edge, v[EDGE_NUGGET] ** 2 / rows.count, 0.0)
+            diagonal = diagonal + edge
+            if derivatives:
+                by[EDGE_NUGGET] = np.diag(2.0 * edge)
+        k[np.diag_indices(len(rows))] += diagonal
+        return k, [by[i] for i in self.active] if derivatives else []
