@@ -8,7 +8,7 @@ from numpy.typing import ArrayLike
 from kuka_export.main_module import BasePlan, Start, base_module, information, main_module
 from kuka_export.modules import Packed, pack_loads, pack_modules
 from kuka_export.names import duplicates
-from kuka_export.options import ProgramOptions
+from kuka_export.options import DEFAULT_OPTIONS, ProgramOptions
 from kuka_export.passes import blend_distance_mm, block_numbers, pass_chunks, style_of
 from kuka_export.preflight import (
     check_correction,
@@ -25,13 +25,14 @@ from planner.errors import EchoBaseError
 from planner.frames import Transform
 from planner.issues import Issue, errors_in
 from planner.placement import assume_nominal, corrected_base, define_corrected
+from planner.robot import first_axes, load_robot
 from planner.setup import Setup
 from planner.toolpath import ToolPath
 
 
 def build_program(
     path: ToolPath, setup: Setup, name: str, label: str = "", *, T_base_basecorr: Transform | None = None,
-    options: ProgramOptions = ProgramOptions(), notes: Sequence[str] = (), centroid_base_mm: ArrayLike | None = None,
+    options: ProgramOptions = DEFAULT_OPTIONS, notes: Sequence[str] = (), centroid_base_mm: ArrayLike | None = None,
 ) -> KrlProgram:  # fmt: skip
     """Return the program of a decimated path.
 
@@ -121,8 +122,6 @@ def _start(
     setup: Setup, r: Route, a: int, b: int, T_base_basecorr: Transform | None, issues: list[Issue]
 ) -> Start | None:
     """Return the axis values of the first pose of rows [a, b), in the configuration that serves them all."""
-    from planner.robot import first_axes, load_robot  # the robot models load only when axes are asked for
-
     T_world = setup.T_world_base if T_base_basecorr is None else corrected_base(setup.T_world_base, T_base_basecorr)
     try:
         found = first_axes(load_robot(setup.robot), setup, r.Ts_tcp[a:b], T_world)

@@ -8,7 +8,8 @@ from numpy.typing import ArrayLike
 
 from kuka_export.build import build_program
 from kuka_export.check import check_files
-from kuka_export.options import ProgramOptions
+from kuka_export.language.library import load
+from kuka_export.options import DEFAULT_OPTIONS, ProgramOptions
 from kuka_export.program import KrlProgram
 from kuka_export.proof import Proof, prove
 from kuka_export.writer import write_program
@@ -34,7 +35,7 @@ class Export:
 
 def export(
     path: ToolPath, setup: Setup, name: str, label: str = "", *, T_base_basecorr: Transform | None = None,
-    options: ProgramOptions = ProgramOptions(), notes: Sequence[str] = (), centroid_base_mm: ArrayLike | None = None,
+    options: ProgramOptions = DEFAULT_OPTIONS, notes: Sequence[str] = (), centroid_base_mm: ArrayLike | None = None,
     verdict: Verdict | None = None, acceptance: str = "",
 ) -> Export:  # fmt: skip
     """Return the proven program of a decimated path; arguments as `build_program`.
@@ -61,10 +62,11 @@ def export(
         path, setup, name, label, T_base_basecorr=T_base_basecorr, options=options, notes=(*accepted, *notes), centroid_base_mm=centroid_base_mm,
     )  # fmt: skip
     files = write_program(program)
-    proof = prove(program, files)
+    library = load(files)
+    proof = prove(program, files, library)
     if not proof.ok:
         raise EchoBaseError(*proof.issues)
-    found = check_files(files, program.profile)
+    found = check_files(files, program.profile, library)
     if errors_in(found):
         raise EchoBaseError(*errors_in(found))
     return Export(program, files, proof, program.issues, manifest(program, files, proof, acceptance))
@@ -73,7 +75,7 @@ def export(
 def manifest(program: KrlProgram, files: dict[str, bytes], proof: Proof, acceptance: str = "") -> dict[str, Any]:
     """Return what the program is, in numbers: files with size and SHA-256, differences, base, tool, limits and use."""
     offset, frame = program.base_offset, program.base_frame
-    loads = [
+    loads: list[dict[str, Any]] = [
         {
             "main": load.main,
             "modules": list(load.modules),

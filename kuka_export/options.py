@@ -52,3 +52,6 @@ class ProgramOptions(Strict):
     """Who exports; a comment in the main module."""
     date: str = ""
     """Date of export; a comment in the main module."""
+
+
+DEFAULT_OPTIONS = ProgramOptions()

@@ -6,9 +6,10 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
+from kuka_export.language.library import Library, load
 from kuka_export.numbers import DEG_ROUNDING, MM_ROUNDING
 from kuka_export.program import Fold, KrlProgram, Moves, Setting, SplineBlock, Statement, WaitInput
-from kuka_export.reader import KrlReading, read_program
+from kuka_export.reader import KrlReading, read_library
 from planner.errors import EchoBaseError
 from planner.frames import Array
 from planner.issues import Issue
@@ -41,16 +42,17 @@ class Proof:
         return not self.issues
 
 
-def prove(program: KrlProgram, files: dict[str, bytes]) -> Proof:
+def prove(program: KrlProgram, files: dict[str, bytes], library: Library | None = None) -> Proof:
     """Return the proof of a program's files, read by a reader that does not know the writer.
 
     Compared: every pose in order (0.0005 mm and 0.00005 deg per component), kind of motion, spline blocks, blending, data
-    signal, passes, speeds, base and tool and their numbers, settings, first axis values, waits, calls.
+    signal, passes, speeds, base and tool and their numbers, settings, first axis values, waits, calls. `library`: the same
+    files, parsed already.
     """
     sha = {name: hashlib.sha256(data).hexdigest() for name, data in files.items()}
     size = sum(len(data) for data in files.values())
     try:
-        reading = read_program(files, program.data_output)
+        reading = read_library(load(files) if library is None else library, program.data_output)
     except EchoBaseError as error:
         return Proof(0, 0, len(program.modules), size, np.inf, np.inf, sha, error.issues)
     faults, mm, deg = _compare(program, reading)

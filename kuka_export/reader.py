@@ -77,7 +77,11 @@ def read_program(files: dict[str, bytes], data_output: int | None = None) -> Krl
     Raises EchoBaseError with every line that is not KRL, or with the first statement that cannot be followed: branches,
     circles, points whose values stand nowhere, a base or tool that changes on the way.
     """
-    library = load(files)
+    return read_library(load(files), data_output)
+
+
+def read_library(library: Library, data_output: int | None = None) -> KrlReading:
+    """Return the reading of files parsed already; as `read_program`."""
     problems = [
         Issue("error", code, message, "Correct the line.", f"{source.name}:{line}")
         for source in library.files.values()

@@ -2,16 +2,14 @@
 
 import math
 import re
-from collections.abc import Callable
-from dataclasses import dataclass, field
+from contextlib import suppress
 
+from kuka_export.language.followed import BaseState, Followed, Switch
 from kuka_export.language.inline_forms import basis_call, with_clause
 from kuka_export.language.lexer import KrlSyntaxError
 from kuka_export.language.library import Library
 from kuka_export.language.nodes import (
-    Aggregate,
     Assign,
-    CallExpression,
     CallStatement,
     Chain,
     Control,
@@ -38,52 +36,6 @@ _PASS = re.compile(r"^\s*FOLD\s+PASS\s+(\d+)", re.IGNORECASE)
 _IGNORED = frozenset({"INTERRUPT DECL", "INTERRUPT ON", "INTERRUPT OFF", "INTERRUPT ENABLE", "INTERRUPT DISABLE", "CONTINUE", "LABEL",
                       "HALT", "CONST_VEL START", "CONST_VEL END", "STRUC", "ENUM", "STOP WHEN"})  # fmt: skip
 MAX_CALL_DEPTH = 30
-
-
-@dataclass(frozen=True)
-class BaseState:
-    """$BASE: BASE_DATA index (None: a frame of its own, 0: WORLD), frame composed onto it, or the frame itself."""
-
-    number: int | None
-    offset: tuple[float, ...] | None = None
-    frame: tuple[float, ...] | None = None
-
-
-@dataclass
-class Switch:
-    """An output that changes from motion number `motion` on; `value` None is a pulse. `exact`: at a programmed point."""
-
-    motion: int
-    output: int
-    value: bool | None
-    by_trigger: bool
-    exact: bool
-    line: int
-
-
-@dataclass
-class Followed:
-    """What a program did, motion by motion (lists of equal length), and what it set."""
-
-    poses: list[tuple[float, ...]] = field(default_factory=list)
-    words: list[str] = field(default_factory=list)
-    block: list[int] = field(default_factory=list)
-    speed_mm_s: list[float] = field(default_factory=list)
-    fold_pass: list[int] = field(default_factory=list)
-    module: list[str] = field(default_factory=list)
-    lines: list[int] = field(default_factory=list)
-    approximation: list[str] = field(default_factory=list)
-    switches: list[Switch] = field(default_factory=list)
-    comments: list[tuple[int, str]] = field(default_factory=list)
-    axis_moves: list[tuple[int, str, tuple[float, ...]]] = field(default_factory=list)
-    homes: list[int] = field(default_factory=list)
-    waits: list[int] = field(default_factory=list)
-    calls: list[tuple[str, str]] = field(default_factory=list)
-    bases: list[tuple[int, BaseState, int | None]] = field(default_factory=list)
-    base_data: dict[int, tuple[float, ...]] = field(default_factory=dict)
-    base_writes: list[tuple[int, str, int]] = field(default_factory=list)
-    settings: dict[str, Value] = field(default_factory=dict)
-    notes: list[Issue] = field(default_factory=list)
 
 
 class Follower:
@@ -113,18 +65,16 @@ class Follower:
     def _values(self, routine: Routine, data_list: bool) -> None:
         for s in routine.body:
             if isinstance(s, Declaration) and s.value is not None and s.type != "SIGNAL":
-                self._try(
-                    s.line,
-                    lambda s=s: self.known.__setitem__(key_of(s.names[0], self.known), evaluate(s.value, self.known)),
-                )
+                self._declare(s)
             elif data_list and isinstance(s, Assign):
-                self._try(s.line, lambda s=s: self._assign(s))
+                with suppress(UnknownValueError, KrlSyntaxError):
+                    self._assign(s)
 
-    def _try(self, line: int, work: Callable[[], object]) -> None:
-        try:
-            work()
-        except (UnknownValueError, KrlSyntaxError):
-            return  # a value nobody may need; a motion that needs it says so
+    def _declare(self, s: Declaration) -> None:
+        # A value that cannot be had may be one nobody needs; a motion that needs it says so.
+        with suppress(UnknownValueError, KrlSyntaxError):
+            if s.value is not None:
+                self.known[key_of(s.names[0], self.known)] = evaluate(s.value, self.known)
 
     def run(self, source: SourceFile, routine: Routine) -> None:
         """Follow one routine to its end; raises EchoBaseError with file and line if it cannot be followed."""
@@ -140,13 +90,13 @@ class Follower:
                     self._step(s, routine)
                 except UnknownValueError as error:
                     raise self._stop(
-                        _line(s),
+                        s.line,
                         "krl-unknown-value",
                         f"The value of {error.name} stands in none of the files.",
                         "Add the data list that holds it.",
                     ) from error
                 except KrlSyntaxError as error:
-                    raise self._stop(_line(s), error.code, error.message, "Correct the line.") from error
+                    raise self._stop(s.line, error.code, error.message, "Correct the line.") from error
         finally:
             self.source = outer
             self.depth -= 1
@@ -302,22 +252,30 @@ class Follower:
             raise KrlSyntaxError(
                 "krl-unsupported-motion", f"{s.word} cannot be read as a path of straight lines and splines."
             )
+        pose = s.pose
+        if pose is None:
+            pose = self._target(s)
+        if pose is not None:
+            self._to_pose(s, pose, routine)
+
+    def _target(self, s: Move) -> tuple[float, ...] | None:
+        """Return the pose of a target that is not six plain numbers; None for axis values and motions that go nowhere."""
         target = s.targets[0]
         if isinstance(target, Designator) and target.root in ("$AXIS_ACT", "$POS_ACT"):
-            return
+            return None
         if isinstance(target, Designator) and target.root.startswith("XHOME") and target.root not in self.known:
             self.out.homes.append(len(self.out.poses))
             self._after_motion(self._before_motion())
-            return
-        pose = _plain(target)
-        if pose is None:
-            value = evaluate(target, self.known)
-            if not isinstance(value, dict):
-                raise KrlSyntaxError("krl-type", "A motion needs a point.")
-            if set(value) & set(AXIS_NAMES[:6]):
-                self._axes(s, value)
-                return
-            pose = self._filled(value)
+            return None
+        value = evaluate(target, self.known)
+        if not isinstance(value, dict):
+            raise KrlSyntaxError("krl-type", "A motion needs a point.")
+        if set(value) & set(AXIS_NAMES[:6]):
+            self._axes(s, value)
+            return None
+        return self._filled(value)
+
+    def _to_pose(self, s: Move, pose: tuple[float, ...], routine: Routine) -> None:
         own_speed = with_clause(self, s.with_) if s.with_ else None
         ends = self._before_motion()
         out = self.out
@@ -383,23 +341,7 @@ class Follower:
         self.out.switches.append(Switch(len(self.out.poses), n, value, by_trigger, exact, line))
 
 
-def _plain(target: object) -> tuple[float, ...] | None:
-    """Return the six numbers of `{X n,Y n,Z n,A n,B n,C n}` in this order; None for any other target."""
-    if isinstance(target, Aggregate) and len(target.components) == 6:
-        parts = target.components
-        if all(isinstance(v, Number) for _, v in parts) and tuple(n for n, _ in parts) == CARTESIAN:
-            return tuple(v.value for _, v in parts)  # type: ignore[union-attr]
-    return None
-
-
 def _at_start(t: Trigger) -> bool:
     if t.measure == "PATH":
         return t.on_start
     return isinstance(t.amount, Number) and t.amount.value == 0.0
-
-
-def _line(s: Statement | Note) -> int:
-    return s.line
-
-
-__all__ = ["BaseState", "CallExpression", "Followed", "Follower", "Switch"]

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
+from kuka_export.language.followed import BaseState
 from kuka_export.language.nodes import Assign, CallExpression, CallStatement, Enumeration, Expression
 from kuka_export.language.values import UnknownValueError, evaluate, number
 
@@ -16,8 +17,6 @@ INITIAL_SPEED_MM_S = 2000.0
 
 def basis_call(f: Follower, s: CallStatement) -> None:
     """Follow BAS(#COMMAND, value): INITMOV, BASE, TOOL, FRAMES, VEL_CP and CP_PARAMS change what is followed."""
-    from kuka_export.language.follow import BaseState
-
     command = s.arguments[0].name if s.arguments and isinstance(s.arguments[0], Enumeration) else ""
     value = s.arguments[1] if len(s.arguments) > 1 else None
     if command == "INITMOV":
@@ -33,8 +32,6 @@ def basis_call(f: Follower, s: CallStatement) -> None:
 
 
 def _frames(f: Follower, data: object) -> None:
-    from kuka_export.language.follow import BaseState
-
     if not isinstance(data, dict):
         raise UnknownValueError("FDAT_ACT")
     if "BASE_NO" in data:
@@ -45,8 +42,6 @@ def _frames(f: Follower, data: object) -> None:
 
 def with_clause(f: Follower, clause: tuple[Assign, ...]) -> float | None:
     """Follow the assignments behind WITH; return the speed they set (mm/s), or None."""
-    from kuka_export.language.follow import BaseState
-
     speed: float | None = None
     for item in clause:
         name, value = item.target.dotted, item.value

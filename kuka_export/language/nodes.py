@@ -100,15 +100,26 @@ class Pulse:
     seconds: Expression
 
 
-@dataclass(frozen=True)
+@dataclass(slots=True, eq=False)
 class Move:
-    """A motion; `with_` are the assignments behind WITH."""
+    """A motion; `with_` are the assignments behind WITH.
+
+    `pose` is set for a target of six plain numbers X Y Z A B C in this order, which is what long programs are made of;
+    `targets` says the same as expressions.
+    """
 
     line: int
     word: str
-    targets: tuple[Expression, ...]
+    given: tuple[Expression, ...]
     approximation: tuple[str, ...] = ()
     with_: tuple[Assign, ...] = ()
+    pose: tuple[float, ...] | None = None
+
+    @property
+    def targets(self) -> tuple[Expression, ...]:
+        if self.pose is None:
+            return self.given
+        return (Aggregate("", tuple(zip("XYZABC", map(Number, self.pose), strict=True))),)
 
 
 @dataclass(frozen=True)

@@ -4,7 +4,7 @@ import re
 
 from kuka_export.language.expressions import Cursor
 from kuka_export.language.lexer import KrlSyntaxError, tokens
-from kuka_export.language.nodes import Aggregate, Control, Move, Note, Number, Routine, SourceFile, Unary
+from kuka_export.language.nodes import Control, Move, Note, Number, Routine, SourceFile, Unary
 from kuka_export.language.statements import label, statement
 from kuka_export.language.vocabulary import KEYWORDS, TYPES
 
@@ -20,7 +20,6 @@ _PLAIN_MOVE = re.compile(
     r"\s*(C_DIS|C_SPL|C_VEL|C_ORI)?\s*$",
     re.IGNORECASE,
 )
-_XYZABC = ("X", "Y", "Z", "A", "B", "C")
 
 
 def parse_file(name: str, text: str, fast: bool = True) -> SourceFile:
@@ -69,9 +68,9 @@ def parse_file(name: str, text: str, fast: bool = True) -> SourceFile:
 
 
 def _plain_move(match: re.Match[str], number: int) -> Move:
-    word, *values, approximation = match.groups()
-    parts = tuple((k, Number(float(v))) for k, v in zip(_XYZABC, values, strict=True))
-    return Move(number, word.upper(), (Aggregate("", parts),), (approximation.upper(),) if approximation else ())
+    word, x, y, z, a, b, c, approximation = match.groups()
+    pose = (float(x), float(y), float(z), float(a), float(b), float(c))
+    return Move(number, word.upper(), (), (approximation.upper(),) if approximation else (), (), pose)
 
 
 def _note(source: SourceFile, routine: Routine | None, number: int, text: str) -> None:
@@ -99,7 +98,7 @@ def _open(source: SourceFile, number: int, line: str) -> Routine | None:
         routine.name = c.name("a routine name")
         if routine.word == "DEFDAT":
             routine.is_public = c.take("PUBLIC")
-        elif c.token.kind != "end" or routine.word == "DEFFCT":
+        else:
             routine.parameters = _parameters(c)
         c.end()
     except KrlSyntaxError as error:
