@@ -45,7 +45,8 @@ def _dtype(header: dict[str, list[str]], name: str) -> tuple[np.dtype[Any], list
     try:
         fields, sizes, types = header["FIELDS"], header["SIZE"], header["TYPE"]
         counts = [int(word) for word in header.get("COUNT", ["1"] * len(fields))]
-        total = int(header.get("POINTS", [str(int(header["WIDTH"][0]) * int(header["HEIGHT"][0]))])[0])
+        size = header["WIDTH"] + header["HEIGHT"] if "POINTS" not in header else header["POINTS"]
+        total = int(np.prod([int(word) for word in size]))
         form = []
         for i, field in enumerate(fields):
             unique = field if field not in ("_", "") else f"_{i}"
