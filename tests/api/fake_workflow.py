@@ -82,7 +82,7 @@ def plan(request: PlanRequest, progress):
     _obey(request.name, progress)
     points = list(request.keypoints) or suggest_keypoints(None, None)
     listed = [p.model_dump() for p in points]
-    text = json.dumps([request.setup.model_dump(mode="json"), listed, request.source.read_bytes().hex()[:64]])
+    text = json.dumps([request.setup.model_dump(mode="json"), listed, request.seeds_part, request.source.read_bytes().hex()[:64]])
     mark = hashlib.sha256(text.encode()).hexdigest()[:8].encode()
     program = PROGRAM.replace(b"END\r\n", b"; " + mark + b"\r\nEND\r\n")
     sha = hashlib.sha256(program).hexdigest()

@@ -1,11 +1,12 @@
 """A real server in a process of its own, and small clients for it."""
 
+import json
 import os
 import signal
 import socket
 import subprocess
 import sys
-import time
+from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
 
@@ -33,33 +34,29 @@ class ServerProcess:
     def start(self) -> "ServerProcess":
         code = "import sys; from pathlib import Path; from app.server import serve; "
         code += f"sys.exit(serve('127.0.0.1', {self.port}, Path({str(self.data)!r})))"
-        self.process = subprocess.Popen([sys.executable, "-c", code], cwd=ROOT, env=self.env)
-        self.wait_ready()
+        self.process = subprocess.Popen([sys.executable, "-c", code], cwd=ROOT, env=self.env, stdout=subprocess.PIPE)
+        assert self.process.stdout is not None
+        # The socket listens before the address is printed: the first request waits until it is served.
+        line = self.process.stdout.readline().decode()
+        assert self.url in line, f"the server did not start: {line!r}"
+        assert httpx.get(f"{self.url}/api/v1/health", timeout=60.0).status_code == 200
         return self
 
-    def wait_ready(self, longest_s: float = 60.0) -> None:
-        end = time.monotonic() + longest_s
-        while time.monotonic() < end:
-            assert self.process is not None
-            if self.process.poll() is not None:
-                raise AssertionError(f"the server ended with {self.process.returncode}")
-            try:
-                if httpx.get(f"{self.url}/api/v1/health", timeout=2.0).status_code == 200:
-                    return
-            except httpx.TransportError:
-                pass
-            time.sleep(0.02)
-        raise AssertionError("the server did not start")
-
     def kill(self) -> None:
-        assert self.process is not None
-        self.process.send_signal(signal.SIGKILL)
-        self.process.wait()
+        """End it as a power cut would, as far as the process can tell."""
+        self._end(signal.SIGKILL)
 
     def stop(self) -> int:
+        """Ask it to end; return its status."""
+        return self._end(signal.SIGTERM)
+
+    def _end(self, how: signal.Signals) -> int:
         assert self.process is not None
-        self.process.send_signal(signal.SIGTERM)
-        return self.process.wait(timeout=30)
+        self.process.send_signal(how)
+        status = self.process.wait(timeout=30)
+        assert self.process.stdout is not None
+        self.process.stdout.close()
+        return status
 
 
 @contextmanager
@@ -72,12 +69,26 @@ def running(data: Path, **settings: object):
             server.stop()
 
 
-def finished(client: httpx.Client, job: dict, longest_s: float = 60.0) -> dict:
+def events(client: httpx.Client, address: str, last: int | None = None) -> Iterator[tuple[int, str, dict]]:
+    """Yield (number, name, data) of a stream until the server ends it."""
+    headers = {} if last is None else {"Last-Event-ID": str(last)}
+    with client.stream("GET", address, headers=headers, timeout=60.0) as answer:
+        assert answer.status_code == 200
+        number, name = 0, ""
+        for line in answer.iter_lines():
+            key, _, value = line.partition(": ")
+            if key == "id":
+                number = int(value)
+            elif key == "event":
+                name = value
+            elif key == "data":
+                yield number, name, json.loads(value)
+
+
+def finished(client: httpx.Client, job: dict) -> dict:
     """Return a job when it is over."""
-    end = time.monotonic() + longest_s
-    while time.monotonic() < end:
-        job = client.get(f"/api/v1/jobs/{job['id']}").json()
-        if job["state"] not in ("queued", "running"):
-            return job
-        time.sleep(0.03)
-    raise AssertionError(f"the job is still {job['state']}")
+    for _ in events(client, f"/api/v1/jobs/{job['id']}/events"):
+        pass
+    job = client.get(f"/api/v1/jobs/{job['id']}").json()
+    assert job["state"] not in ("queued", "running")
+    return job
