@@ -28,18 +28,21 @@ def bubbles(distance_mm: Array, order: NDArray[np.intp], group: NDArray[Any]) ->
     smooth = median_filter(d, size=WINDOW, mode="nearest")
     half = WINDOW // 2
     n = len(d)
-    left, right = np.clip(np.arange(n) - half, 0, n - 1), np.clip(np.arange(n) + half, 0, n - 1)
-    whole = (track[left] == track) & (track[right] == track)
-    smooth = np.where(whole, smooth, _end_median(d, track, half))
+    place = np.arange(n)
+    left, right = place - half, place + half
+    whole = (left >= 0) & (right < n)
+    whole &= (track[np.maximum(left, 0)] == track) & (track[np.minimum(right, n - 1)] == track)
+    smooth[~whole] = _end_median(d, track, np.flatnonzero(~whole), half)
     off = np.abs(d - smooth)
     scale = MAD * float(np.median(off))
     out[order] = off > max(LEAST_MM, SIGMAS * scale)
     return out
 
 
-def _end_median(d: Array, track: NDArray[Any], half: int) -> Array:
-    """Median over the part of the window that lies on the same track."""
-    n = len(d)
-    index = np.clip(np.arange(n)[:, None] + np.arange(-half, half + 1), 0, n - 1)
-    same = track[index] == track[:, None]
+def _end_median(d: Array, track: NDArray[Any], rows: NDArray[np.intp], half: int) -> Array:
+    """Median at `rows` over the part of the window that lies on the same track."""
+    index = rows[:, None] + np.arange(-half, half + 1)
+    inside = (index >= 0) & (index < len(d))
+    index = np.clip(index, 0, len(d) - 1)
+    same = inside & (track[index] == track[rows][:, None])
     return np.asarray(np.nanmedian(np.where(same, d[index], np.nan), axis=1))
