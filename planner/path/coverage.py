@@ -9,7 +9,7 @@ from scipy.spatial import cKDTree
 from planner.frames import Array
 from planner.path.isolines import Ints
 from planner.path.mesh import PathMesh
-from planner.path.sampling import Samples, sample_every_face
+from planner.path.sampling import Samples, sample_equal_area, sample_every_face
 from planner.setup import Setup
 from planner.surface.curved import CurvedSurface
 from planner.toolpath import ToolPath
@@ -75,6 +75,17 @@ def coverage(curved: CurvedSurface, path: ToolPath, setup: Setup) -> Coverage:
     if poses is not None:
         _sweep(points, normals, poses, setup, swept, within)
     return _summary(curved, samples, points, swept, within, setup)
+
+
+def swept_share(curved: CurvedSurface, path: ToolPath, setup: Setup, samples: int = 30_000) -> float:
+    """Return the swept share of the surface, 0..1, from fewer samples: for planners that try many paths."""
+    s = sample_equal_area(curved.surface.face_areas_mm2, samples)
+    points, normals = curved.evaluate(s.face, s.bary)
+    swept = np.zeros(len(points), dtype=bool)
+    poses = _poses(path)
+    if poses is not None:
+        _sweep(points, normals, poses, setup, swept, np.zeros_like(swept))
+    return float(swept.mean())
 
 
 def _poses(path: ToolPath) -> _Poses | None:

@@ -1,6 +1,6 @@
 """From surface points in runs to a `ToolPath`: contact frames, lead-in and lead-out, approach and retract."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -28,6 +28,10 @@ class DataRuns:
     bary: Array
     run: Ints
     heading: NDArray[np.int8]
+
+    def with_heading(self, heading: NDArray[np.int8]) -> "DataRuns":
+        """Return the same runs with other headings."""
+        return replace(self, heading=heading)
 
 
 def contact_frames(points: Array, normals: Array, travel: Array) -> Transform:

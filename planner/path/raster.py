@@ -3,7 +3,6 @@
 import numpy as np
 from numpy.typing import NDArray
 from scipy.ndimage import maximum_filter1d
-from scipy.signal import savgol_filter
 
 from planner.errors import fail
 from planner.frames import Array
@@ -16,6 +15,7 @@ from planner.path.passes import DataRuns, assemble, headings
 from planner.path.raster_geodesic import geodesic_cut
 from planner.path.raster_plane import plane_cut
 from planner.path.tracks import Tracks, split_at_turns, tracks
+from planner.path.travel import along_track
 from planner.setup import Setup
 from planner.surface.curved import CurvedSurface
 from planner.toolpath import ToolPath
@@ -23,7 +23,6 @@ from planner.toolpath import ToolPath
 MOST_POSES = 5_000_000
 GEOMETRY_SPACING_MM = 5.0
 """Dense poses stand no farther apart than this, however sparse the acquisition, so that they describe the surface."""
-_SMOOTHING_MM = 20.0
 _SHARP_DEG = 30.0
 
 
@@ -123,29 +122,10 @@ def _in_order(track: Tracks, axes: ScanAxes) -> Tracks:
 
 def _travel(track: Tracks, points: Array, normals: Array, across: Array, spacing: float, exact: bool) -> Array:
     """Return the direction of travel (n, 3), unit and tangent; smooth, for the array turns with it."""
-    rough = tangent(_along_track(track, points, spacing), normals)
+    rough = tangent(along_track(track, points, spacing), normals)
     if not exact:
         return rough
     straight = np.cross(across, normals)
     straight *= np.sign(np.einsum("ij,ij->i", straight, rough))[:, None]
     sound = np.linalg.norm(straight, axis=1, keepdims=True) > 0.5
     return np.where(sound, straight, rough)
-
-
-def _along_track(track: Tracks, points: Array, spacing: float) -> Array:
-    """Return derivatives (n, 3) of the tracks: local parabolas over `_SMOOTHING_MM` either side, one-sided at ends."""
-    out = np.zeros_like(points)
-    half = max(int(np.ceil(_SMOOTHING_MM / spacing)), 2)
-    first, last = track.bounds()
-    for a, b, closed in zip(first, last, track.closed, strict=True):
-        run = points[a : b + 1]
-        n = len(run)
-        if closed and n > 2 * half:
-            around = np.concatenate([run[-half - 1 : -1], run, run[1 : half + 1]])
-            out[a : b + 1] = savgol_filter(around, 2 * half + 1, 2, deriv=1, axis=0)[half:-half]
-        elif n < 5:
-            out[a : b + 1] = np.gradient(run, axis=0)
-        else:
-            window = min(2 * half + 1, n if n % 2 else n - 1)
-            out[a : b + 1] = savgol_filter(run, window, 2, deriv=1, axis=0)
-    return out

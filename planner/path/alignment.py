@@ -1,0 +1,127 @@
+"""The alignment path: passes over the surface through the key points, and across the edges where they tell something."""
+
+import numpy as np
+
+from planner.errors import EchoBaseError, fail
+from planner.frames import Array
+from planner.keypoint import KeyPoint
+from planner.path.axes import ScanAxes, scan_axes
+from planner.path.crossings import PATCH_MM, PATCH_SIGMA_MM, Rim, best_crossings, edge_rows, prior_precision, rim, rows
+from planner.path.cut import tangent
+from planner.path.ends import Run, finished, overrun
+from planner.path.links import with_links
+from planner.path.mesh import PathMesh
+from planner.path.order import nearest_order
+from planner.path.passes import assemble, headings
+from planner.path.raster import acquisition_spacing_mm
+from planner.path.section import Stroke, positions, section, together
+from planner.path.tour import strokes_through
+from planner.path.tracks import measure, resample
+from planner.path.travel import along_track
+from planner.setup import Setup
+from planner.surface.curved import CurvedSurface
+from planner.toolpath import ToolPath
+
+_RIM_SPACING_MM = 5.0
+_CROSSING_MM = 20.0
+
+
+def alignment_path(curved: CurvedSurface, keypoints: tuple[KeyPoint, ...], setup: Setup) -> ToolPath:
+    """Return the dense alignment path (kind `alignment`, at `alignment_standoff_mm`) through all key points.
+
+    Each pass is a plane section of the surface, so it follows it; where the way turns at a key point a new pass begins,
+    for the array turns with the travel. Suggested key points keep to their strips, others are visited by a short tour. A
+    pass that ends near an edge goes on to it: with `alignment.edges` across it by `edge_overrun_mm`, data on (face -1, on
+    the surface's continuation), wherever the part ends there; elsewhere, and without, up to the edge margin. With
+    `alignment.edges` crossings are added until the edges on all sides are crossed and all six directions can be found.
+    Raises `EchoBaseError` where no line over the surface joins two key points.
+    """
+    if not keypoints:
+        raise fail(
+            "keypoints-missing", "There are no key points.", "Pick at least three, or let EchoBase suggest them."
+        )
+    mesh = PathMesh.of(curved.surface)
+    axes = scan_axes(curved.surface, setup.inspection.direction_deg)
+    foot = curved.closest(np.array([k.xyz() for k in keypoints]))
+    on_mesh = np.einsum("nk,nkj->nj", foot.bary, mesh.vertices[mesh.faces[foot.face]])
+    edges = rim(curved.surface, _RIM_SPACING_MM)
+    runs: list[Run] = []
+    for members in strokes_through(keypoints, foot.points):
+        for stroke in _lines(curved, mesh, on_mesh[members], foot.normals[members], axes):
+            runs.append(finished(mesh, stroke, edges, setup))
+    if setup.alignment.edges:
+        runs += _crossings(curved, mesh, runs, edges, axes, setup)
+    return _path(curved, mesh, runs, setup)
+
+
+def _lines(curved: CurvedSurface, mesh: PathMesh, points: Array, normals: Array, axes: ScanAxes) -> list[Stroke]:
+    """Return the strokes through points in order: one plane if they share it, else leg by leg."""
+    if len(points) == 1:
+        foot = curved.closest(points[0] + np.outer([1.0, -1.0], axes.along) * _CROSSING_MM)
+        k = int(np.argmax(np.linalg.norm(foot.points - points[0], axis=1)))
+        other = np.einsum("k,kj->j", foot.bary[k], mesh.vertices[mesh.faces[foot.face[k]]])
+        return section(mesh, np.stack([points[0], other]), np.stack([normals[0], foot.normals[k]]))
+    side = np.cross(normals.mean(axis=0), points[-1] - points[0])
+    off = np.abs((points - points[0]) @ side) / max(float(np.linalg.norm(side)), 1e-12)
+    if len(points) > 2 and float(off.max()) > 1.0:
+        return [s for i in range(len(points) - 1) for s in section(mesh, points[i : i + 2], normals[i : i + 2])]
+    return section(mesh, points, normals)
+
+
+def _crossings(
+    curved: CurvedSurface, mesh: PathMesh, runs: list[Run], edges: Rim, axes: ScanAxes, setup: Setup
+) -> list[Run]:
+    """Return short extra passes across edges that nothing crosses yet and that the estimate needs."""
+    centre = curved.surface.centroid_part
+    precision = prior_precision(setup)
+    for run in runs:
+        s = np.arange(run.s0, run.s1, PATCH_MM)
+        _, bary, face = positions(mesh, run.line, s)
+        p, n = curved.evaluate(face.astype(np.int32), bary)
+        j = rows(p, n, centre) / PATCH_SIGMA_MM
+        precision = precision + j.T @ j
+    crossed = [run.rim_at(edges, end) for run in runs for end in run.over]
+    if crossed:
+        j = edge_rows(edges.points[crossed], edges.conormals[crossed], edges.along[crossed], centre, setup).reshape(
+            -1, 6
+        )
+        precision = precision + j.T @ j
+    sides = np.stack([axes.along, -axes.along, axes.across, -axes.across])
+    out = []
+    for k in best_crossings(edges, edges.conormals[crossed], precision, sides, centre, setup):
+        run = _crossing(curved, mesh, edges, k, setup)
+        if run is not None:
+            out.append(run)
+    return out
+
+
+def _crossing(curved: CurvedSurface, mesh: PathMesh, edges: Rim, k: int, setup: Setup) -> Run | None:
+    """Return the pass from inside across the edge at point k of the rim, or None where no straight way leads there."""
+    p, c = edges.points[k], edges.conormals[k]
+    foot = curved.closest(np.stack([p - c * _CROSSING_MM, p - c * 0.01]))
+    on_mesh = np.einsum("nk,nkj->nj", foot.bary, mesh.vertices[mesh.faces[foot.face]])
+    try:
+        stroke = section(mesh, on_mesh, foot.normals)[-1]
+    except EchoBaseError:
+        return None
+    run = finished(mesh, stroke, edges, setup, only_last=True)
+    return run if run.over else None
+
+
+def _path(curved: CurvedSurface, mesh: PathMesh, runs: list[Run], setup: Setup) -> ToolPath:
+    spacing = acquisition_spacing_mm(setup)
+    lengths = measure(mesh, together([Stroke(r.line, r.s0, r.s1, 0.0) for r in runs]))
+    s0, s1 = np.array([r.s0 for r in runs]), np.array([r.s1 for r in runs])
+    track = resample(lengths, np.arange(len(runs)), s0, s1, np.zeros(len(runs), dtype=bool), spacing)
+    first, last = track.bounds()
+    order, flip = nearest_order(track.points[first], track.points[last])
+    track = track.arranged(order, flip)
+    points, normals = curved.evaluate(track.face, track.bary)
+    travel = tangent(along_track(track, points, spacing), normals)
+    over = [tuple(sorted(1 - end if flip[i] else end for end in runs[k].over)) for i, k in enumerate(order)]
+    data = overrun(
+        points, normals, travel, curved.surface.part_faces[track.face], track.bary, track.run, over, setup, spacing
+    )
+    data = data.with_heading(headings(data.points, data.normals, data.travel, data.run, None))
+    path = assemble(data, "alignment", setup.alignment_standoff_mm, spacing)
+    return with_links(path, curved)

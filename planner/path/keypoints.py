@@ -1,0 +1,142 @@
+"""Key points: put on the surface, judged, and (in `suggest`) chosen."""
+
+import numpy as np
+
+from planner.errors import EchoBaseError
+from planner.issues import Issue
+from planner.keypoint import KeyPoint
+from planner.path.mesh import PathMesh
+from planner.path.suggest import suggest
+from planner.setup import Setup
+from planner.surface.closest import Foot
+from planner.surface.curved import CurvedSurface
+
+__all__ = ["snap", "suggest", "verdicts"]
+
+SNAP_MM = 2.0
+_SAME_MM = 0.5
+
+
+def _feet(curved: CurvedSurface, keypoints: tuple[KeyPoint, ...]) -> Foot:
+    return curved.closest(np.array([k.xyz() for k in keypoints], dtype=np.float64).reshape(-1, 3))
+
+
+def snap(curved: CurvedSurface, keypoints: tuple[KeyPoint, ...]) -> tuple[KeyPoint, ...]:
+    """Return the key points moved to the closest point of the inspection surface.
+
+    Raises `EchoBaseError` naming every key point that is farther than 2 mm from it, and ids used twice.
+    """
+    if not keypoints:
+        return ()
+    foot = _feet(curved, keypoints)
+    away = np.linalg.norm(foot.points - np.array([k.xyz() for k in keypoints]), axis=1)
+    ids = [k.id for k in keypoints]
+    issues = [
+        Issue(
+            "error",
+            "keypoint-off-surface",
+            f"Key point {k.id} is {d:.2f} mm from the inspection surface (at most {SNAP_MM:g} mm).",
+            "Move it onto the surface, or check the unit of the part and the frame of the key points (part).",
+            f"keypoints: {k.id}",
+        )
+        for k, d in zip(keypoints, away, strict=True)
+        if not d <= SNAP_MM
+    ]
+    issues += [
+        Issue("error", "keypoint-id-twice", f"Two key points are called {i}.", "Rename one.", f"keypoints: {i}")
+        for i in sorted({i for i in ids if ids.count(i) > 1})
+    ]
+    if issues:
+        raise EchoBaseError(*issues)
+    return tuple(
+        k.model_copy(update={"x_mm": float(p[0]), "y_mm": float(p[1]), "z_mm": float(p[2])})
+        for k, p in zip(keypoints, foot.points, strict=True)
+    )
+
+
+def verdicts(curved: CurvedSurface, keypoints: tuple[KeyPoint, ...], setup: Setup) -> list[Issue]:
+    """Return what speaks against each key point: off the surface, near an edge, too curved for a plane, duplicate.
+
+    All warnings but the first: they cost accuracy of the key-point method, not safety. A plane fitted within the search
+    radius r of a surface of curvature k lies k r^2 / 4 off on average, and its rim is turned by k r.
+    """
+    if not keypoints:
+        return []
+    foot, radius = _feet(curved, keypoints), setup.alignment.search_radius_mm
+    asked = np.array([k.xyz() for k in keypoints])
+    away = np.linalg.norm(foot.points - asked, axis=1)
+    edge = PathMesh.of(curved.surface).boundary_distance(foot.points, radius)
+    bend = np.abs(np.linalg.eigvalsh(curved.shape_operator(foot.face, foot.bary))).max(axis=1)
+    offset = bend * radius**2 / 4.0
+    turned = np.cos(np.minimum(bend * radius, np.pi)) < setup.alignment.min_normal_dot
+    out: list[Issue] = []
+    for i, k in enumerate(keypoints):
+        where = f"keypoints: {k.id}"
+        if away[i] > SNAP_MM:
+            out.append(
+                Issue(
+                    "error",
+                    "keypoint-off-surface",
+                    f"Key point {k.id} is {away[i]:.2f} mm from the inspection surface.",
+                    "Move it onto the surface.",
+                    where,
+                )
+            )
+            continue
+        if edge[i] < radius:
+            out.append(
+                Issue(
+                    "warning",
+                    "keypoint-near-edge",
+                    f"Key point {k.id} is {edge[i]:.1f} mm from an edge, inside its search radius of {radius:g} mm.",
+                    "Move it inwards, or give a smaller alignment.search_radius_mm.",
+                    where,
+                )
+            )
+        if offset[i] > setup.tolerances.position_mm or turned[i]:
+            out.append(
+                Issue(
+                    "warning",
+                    "keypoint-curved",
+                    f"At key point {k.id} the surface (radius {1.0 / max(bend[i], 1e-9):.0f} mm) leaves a plane by "
+                    f"{offset[i]:.2f} mm on average within {radius:g} mm.",
+                    "Move it to a flatter place, or give a smaller alignment.search_radius_mm.",
+                    where,
+                )
+            )
+        out += _too_close(keypoints, foot, i, radius)
+    return out + _spread(foot)
+
+
+def _too_close(keypoints: tuple[KeyPoint, ...], foot: Foot, i: int, radius: float) -> list[Issue]:
+    distance = np.linalg.norm(foot.points[:i] - foot.points[i], axis=1)
+    if not len(distance) or distance.min() >= radius:
+        return []
+    j = int(distance.argmin())
+    same = distance[j] < _SAME_MM
+    text = "is a duplicate of" if same else f"is only {distance[j]:.1f} mm from"
+    return [
+        Issue(
+            "warning",
+            "keypoint-duplicate" if same else "keypoint-overlap",
+            f"Key point {keypoints[i].id} {text} {keypoints[j].id}: they use the same readings.",
+            "Remove one, or move them apart by more than the search radius.",
+            f"keypoints: {keypoints[i].id}",
+        )
+    ]
+
+
+def _spread(foot: Foot) -> list[Issue]:
+    centred = foot.points - foot.points.mean(axis=0)
+    size = np.linalg.svd(centred, compute_uv=False) if len(centred) else np.zeros(3)
+    if len(foot.points) >= 3 and size[1] > 0.02 * max(float(size[0]), 1e-9):
+        return []
+    return [
+        Issue(
+            "warning",
+            "keypoints-on-a-line",
+            "The key points are fewer than three or lie on a line: a turn about it cannot be found from them.",
+            "Add key points away from the line.",
+            "keypoints",
+        )
+    ]

@@ -1,0 +1,180 @@
+"""Key points suggested: on strips that cover what was asked and tell most about where the part is."""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from planner.errors import fail
+from planner.frames import Array
+from planner.keypoint import KeyPoint
+from planner.path.alignment import alignment_path
+from planner.path.axes import ScanAxes, scan_axes
+from planner.path.coverage import swept_share
+from planner.path.crossings import PATCH_MM, PATCH_SIGMA_MM, prior_precision, rows
+from planner.path.ends import EDGE_REACH_MM
+from planner.path.mesh import PathMesh
+from planner.path.sampling import sample_equal_area
+from planner.path.section import Stroke, positions, whole_lines
+from planner.path.tour import strip_id
+from planner.setup import Setup
+from planner.surface.curved import CurvedSurface
+
+_SHARES = (0.35, 0.5, 0.65)
+_CLOSE_ENOUGH = 0.01
+_ROUNDS = 8
+_POINTS_WANTED = 12
+
+
+@dataclass(frozen=True, eq=False)
+class _Strip:
+    """A stretch s0..s1 of a line over the surface; free: which ends (first, last) go on to the boundary."""
+
+    stroke: Stroke
+    s0: float
+    s1: float
+    free: tuple[bool, bool]
+
+
+def suggest(curved: CurvedSurface, setup: Setup, seed: int = 0) -> tuple[KeyPoint, ...]:
+    """Return key points, on strips along and across the surface, whose alignment path covers `alignment.coverage` of it.
+
+    Strips run from the edges inwards, spread over the surface; of several divisions between along and across the one with
+    the smallest predicted largest normal error is taken (fixture prior, independent patches of surface). Points keep
+    their search radius from edges and avoid curved places. The same input gives the same points; another `seed` shifts
+    the strips a little. Ids say strip and place (`S3.1`); `alignment_path` relies on them.
+    """
+    mesh = PathMesh.of(curved.surface)
+    axes = scan_axes(curved.surface, setup.inspection.direction_deg)
+    asked = setup.alignment.coverage
+    length = asked * curved.surface.area_mm2 / setup.probe.swath_mm
+    shift = float(np.random.default_rng(seed).uniform(-0.2, 0.2)) if seed else 0.0
+    ranked = []
+    for share in _SHARES:
+        strips = _strips(mesh, axes, share, length, setup, shift)
+        if strips:
+            ranked.append((_largest_error(curved, mesh, strips, setup), share))
+    if not ranked:
+        raise fail(
+            "suggest-no-room", "The surface is too small for key points.", "Give a smaller alignment.search_radius_mm."
+        )
+    share = min(ranked)[1]
+    best: tuple[float, tuple[KeyPoint, ...]] = (np.inf, ())
+    tried: list[tuple[float, float]] = []
+    for _ in range(_ROUNDS):
+        strips = _strips(mesh, axes, share, length, setup, shift)
+        points = _keypoints(curved, mesh, strips, setup) if strips else ()
+        if points:
+            got = swept_share(curved, alignment_path(curved, points, setup), setup)
+            tried.append((length, got))
+            if abs(got - asked) < best[0]:
+                best = (abs(got - asked), points)
+            if best[0] <= _CLOSE_ENOUGH:
+                break
+        length = _next_length(tried, length, asked)
+    if not best[1]:
+        raise fail(
+            "suggest-no-room", "The surface is too small for key points.", "Give a smaller alignment.search_radius_mm."
+        )
+    return best[1]
+
+
+def _next_length(tried: list[tuple[float, float]], length: float, asked: float) -> float:
+    """Return the strip length to try next: between the nearest below and above, or in proportion."""
+    below = [t for t in tried if t[1] <= asked]
+    above = [t for t in tried if t[1] > asked]
+    if below and above:
+        (l0, c0), (l1, c1) = max(below, key=lambda t: t[1]), min(above, key=lambda t: t[1])
+        f = np.clip((asked - c0) / max(c1 - c0, 1e-9), 0.15, 0.85)
+        return float(l0 + f * (l1 - l0))
+    return length * float(np.clip(asked / max(tried[-1][1], 1e-3), 0.5, 2.0)) if tried else length * 1.5
+
+
+def _strips(mesh: PathMesh, axes: ScanAxes, share: float, length: float, setup: Setup, shift: float) -> list[_Strip]:
+    """Return strips of about this total length, `share` of it along the surface, the rest across."""
+    out: list[_Strip] = []
+    for side, part in ((axes.across, share), (axes.along, 1.0 - share)):
+        out += _family(mesh, side, part * length, setup, shift)
+    return out
+
+
+def _family(mesh: PathMesh, side: Array, length: float, setup: Setup, shift: float) -> list[_Strip]:
+    used = (mesh.vertices @ side)[mesh.faces]
+    lo, hi = float(used.min()), float(used.max())
+    probe = whole_lines(mesh, side, lo + (hi - lo) * np.linspace(0.15, 0.85, 7))
+    typical = float(np.median([s.length for s in probe]))
+    least = min(2.5 * setup.alignment.search_radius_mm, 0.45 * typical)
+    count = int(np.ceil(length / typical - 0.05))
+    if count < 2:
+        count = 2 if length / 2.0 >= least else 1
+    part = min(max(length / count, least) / typical, 1.0)
+    inset = 0.5 / count
+    if count <= 3:
+        inset = min(inset, 0.2)
+    inset = min(max(inset, 0.6 * setup.probe.swath_mm / max(hi - lo, 1e-9)), 0.5)
+    at = np.linspace(inset, 1.0 - inset, count) if count > 1 else np.array([0.5])
+    at = np.clip(at + shift / (2.0 * count), 0.02, 0.98)
+    out = []
+    for i, stroke in enumerate(whole_lines(mesh, side, lo + (hi - lo) * at)):
+        span = part * stroke.length
+        if part > 0.95 or stroke.length - span < min(EDGE_REACH_MM, stroke.length / 3.0):
+            out.append(_Strip(stroke, 0.0, stroke.length, (not stroke.loop, not stroke.loop)))
+        elif i % 2 == 0:
+            out.append(_Strip(stroke, 0.0, span, (not stroke.loop, False)))
+        else:
+            out.append(_Strip(stroke, stroke.length - span, stroke.length, (False, not stroke.loop)))
+    return out
+
+
+def _largest_error(curved: CurvedSurface, mesh: PathMesh, strips: list[_Strip], setup: Setup) -> float:
+    """Return the largest normal error over the surface (mm, one sigma) predicted for a scan of these strips."""
+    centre = curved.surface.centroid_part
+    precision = prior_precision(setup)
+    for strip in strips:
+        _, bary, face = positions(mesh, strip.stroke.line, np.arange(strip.s0, strip.s1, PATCH_MM))
+        p, n = curved.evaluate(face.astype(np.int32), bary)
+        j = rows(p, n, centre) / PATCH_SIGMA_MM
+        precision = precision + j.T @ j
+    s = sample_equal_area(curved.surface.face_areas_mm2, 500)
+    p, n = curved.evaluate(s.face, s.bary)
+    g = rows(p, n, centre)
+    return float(np.round(np.sqrt(np.einsum("ni,ij,nj->n", g, np.linalg.inv(precision), g).max()), 9))
+
+
+def _keypoints(curved: CurvedSurface, mesh: PathMesh, strips: list[_Strip], setup: Setup) -> tuple[KeyPoint, ...]:
+    each = int(np.clip(np.ceil(_POINTS_WANTED / len(strips)), 2, 4))
+    out = []
+    for number, strip in enumerate(strips, start=1):
+        s = _places(curved, mesh, strip, each, setup)
+        _, bary, face = positions(mesh, strip.stroke.line, s)
+        points, _ = curved.evaluate(face.astype(np.int32), bary)
+        out += [
+            KeyPoint(id=strip_id(number, i), x_mm=float(p[0]), y_mm=float(p[1]), z_mm=float(p[2]))
+            for i, p in enumerate(points, start=1)
+        ]
+    return tuple(out)
+
+
+def _places(curved: CurvedSurface, mesh: PathMesh, strip: _Strip, count: int, setup: Setup) -> Array:
+    """Return where on the strip its key points stand: off the edges by their search radius, off curved places."""
+    radius = setup.alignment.search_radius_mm
+    span = strip.s1 - strip.s0
+    off = min(1.2 * radius, 0.3 * span, 0.9 * EDGE_REACH_MM)
+    a = strip.s0 + (off if strip.free[0] else 0.0)
+    b = strip.s1 - (off if strip.free[1] else 0.0)
+    count = int(np.clip(1 + (b - a) // (2.0 * radius), 2, count))
+    want = np.linspace(a, b, count)
+    if b - a < 4.0 * radius:
+        return want
+    fine = np.linspace(a, b, 81)
+    _, bary, face = positions(mesh, strip.stroke.line, fine)
+    bend = np.abs(np.linalg.eigvalsh(curved.shape_operator(face.astype(np.int32), bary))).max(axis=1)
+    fixed = (not strip.free[0], not strip.free[1])
+    for i in range(count):
+        if (i == 0 and fixed[0]) or (i == count - 1 and fixed[1]):
+            continue
+        near = np.flatnonzero(np.abs(fine - want[i]) <= 0.15 * (b - a))
+        good = near[bend[near] * radius**2 / 4.0 <= setup.tolerances.position_mm]
+        pick = good[np.abs(fine[good] - want[i]).argmin()] if len(good) else near[bend[near].argmin()]
+        if not (len(good) and abs(fine[pick] - want[i]) < (b - a) / 80.0):
+            want[i] = fine[pick]
+    return np.asarray(want)
