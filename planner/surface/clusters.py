@@ -38,7 +38,7 @@ class Clusters:
 def cluster(vertices: Array, normals: Array, edges: Index, footprint_mm: float) -> Clusters:
     """Return clusters of about footprint / 2.5 in size; every vertex its own where the mesh is not finer than that."""
     cell = footprint_mm / CELLS_PER_FOOTPRINT
-    short = np.linalg.norm(vertices[edges[:, 0]] - vertices[edges[:, 1]], axis=1) < 0.6 * cell
+    short = np.linalg.norm(vertices[edges[:, 0]] - vertices[edges[:, 1]], axis=1) < cell
     if short.mean() < 0.2:
         label = np.arange(len(vertices))
     else:

@@ -11,6 +11,8 @@ RIDGE = np.array([1e-12, 1e-12, 1e-12, 1e-9, 1e-9, 1e-9, 1e-6, 1e-6, 1e-6, 1e-6]
 DIRECTIONS = 8
 # Neighbours that leave less than this share of the directions around a node open do not fix its normal.
 LEAST_SPREAD = 0.04
+# Neighbours agree with a quadric within this residual (rad).
+AGREE_RAD = 0.002
 # A one-sided fit must leave less than this share of the two-sided residual.
 BETTER = 0.5
 
@@ -40,13 +42,22 @@ def residual_slope(phi: Array, h: Array, rho: Array, coefficients: Array) -> Arr
     return np.asarray(np.divide(residual, rho, out=np.zeros_like(h), where=rho > 0))
 
 
-def one_sided(phi: Array, h: Array, weight: Array, rho: Array, sizes: NDArray[np.int64], two_sided: Array) -> Array:
-    """Return coefficients (n, terms) where the curvature jumps at a node: fitted to the smoothest side.
+def one_sided(
+    phi: Array,
+    h: Array,
+    weight: Array,
+    rho: Array,
+    adjacent: NDArray[np.bool_],
+    sizes: NDArray[np.int64],
+    two_sided: Array,
+) -> Array:
+    """Return coefficients (n, terms) where the curvature jumps at or near a node: fitted to its smoothest surroundings.
 
-    A plane that runs tangentially into a fillet has one normal at the seam but two curvatures; a polynomial through both
-    sides has the wrong normal. Of a plane and a quadric through the neighbours in each of eight half-planes, the one with
-    the smallest residual gives the normal, as in essentially non-oscillatory schemes (Harten, Engquist, Osher,
-    Chakravarthy 1987, doi:10.1016/0021-9991(87)90031-3). Without a clearly better side the two-sided fit stays.
+    Where a cylinder runs tangentially into a fillet there is one normal at the seam but two curvatures, and a polynomial
+    through both sides has the wrong normal. Candidates are quadrics through the neighbours in each of eight half-planes
+    and through those that agree with the nearest ring (`adjacent` (p,)); the one with the smallest residual per neighbour
+    to spare is taken, as in essentially non-oscillatory schemes (Harten, Engquist, Osher, Chakravarthy 1987,
+    doi:10.1016/0021-9991(87)90031-3). Without a clearly better one the fit to all stays.
     """
     starts = np.r_[0, np.cumsum(sizes)[:-1]]
     row = np.repeat(np.arange(len(sizes)), sizes)
@@ -56,20 +67,38 @@ def one_sided(phi: Array, h: Array, weight: Array, rho: Array, sizes: NDArray[np
     flat = np.hypot(phi[1], phi[2])
     cosine = np.divide(phi[1], flat, out=np.zeros_like(flat), where=flat > 0)
     sine = np.divide(phi[2], flat, out=np.zeros_like(flat), where=flat > 0)
-    for angle in np.arange(DIRECTIONS) * (2.0 * np.pi / DIRECTIONS):
-        side = (cosine * np.cos(angle) + sine * np.sin(angle) > -0.05) & (flat > 0)
-        count = np.add.reduceat(side.astype(np.int64), starts)
+    sides = [(_agreeing(phi[:6], h, weight, rho, adjacent, starts, row), 5)]
+    angles = np.arange(DIRECTIONS) * (2.0 * np.pi / DIRECTIONS)
+    sides += [(cosine * np.cos(angle) + sine * np.sin(angle) > -0.05, 8) for angle in angles]
+    for side, least in sides:
+        chosen = side & (flat > 0)
+        count = np.add.reduceat(chosen.astype(np.int64), starts)
         total = np.maximum(count, 1)
-        xx, xy, yy = (
-            np.add.reduceat(np.where(side, p, 0.0), starts) / total for p in (cosine**2, cosine * sine, sine**2)
-        )
+        products = (cosine**2, cosine * sine, sine**2)
+        xx, xy, yy = (np.add.reduceat(np.where(chosen, p, 0.0), starts) / total for p in products)
         spread = 0.5 * (xx + yy) - np.sqrt(0.25 * (xx - yy) ** 2 + xy**2)
-        for terms, least in ((3, 3), (6, 8)):
-            found = np.zeros_like(best)
-            found[:, :terms] = solve_segments(phi[:terms], h, np.where(side, weight, 1e-12 * weight), starts)
-            slope = np.where(side, residual_slope(phi, h, rho, found[row]), 0.0)
-            # A quadric has five unknowns; what it leaves is judged per neighbour to spare.
-            rms = np.sqrt(np.add.reduceat(slope * slope, starts) / np.maximum(count - (terms - 1), 1))
-            better = (rms < bound) & (spread > LEAST_SPREAD) & (count >= least)
-            best[better], bound[better] = found[better], rms[better]
+        found = np.zeros_like(best)
+        found[:, :6] = solve_segments(phi[:6], h, np.where(chosen, weight, 0.0), starts)
+        slope = np.where(chosen, residual_slope(phi, h, rho, found[row]), 0.0)
+        rms = np.sqrt(np.add.reduceat(slope * slope, starts) / np.maximum(count - 5, 1))
+        better = (rms < bound) & (spread > LEAST_SPREAD) & (count >= least)
+        best[better], bound[better] = found[better], rms[better]
     return best
+
+
+def _agreeing(
+    phi: Array,
+    h: Array,
+    weight: Array,
+    rho: Array,
+    adjacent: NDArray[np.bool_],
+    starts: NDArray[np.int64],
+    row: NDArray[np.int64],
+) -> NDArray[np.bool_]:
+    """Return which neighbours (p,) lie on one quadric with the nearest ring: reweighted least squares, Cauchy weights."""
+    trust = np.where(adjacent, 1.0, 1e-3)
+    slope = np.zeros_like(h)
+    for scale in (AGREE_RAD, AGREE_RAD, AGREE_RAD / 2.0, AGREE_RAD / 4.0):
+        slope = residual_slope(phi, h, rho, solve_segments(phi, h, weight * trust, starts)[row])
+        trust = 1.0 / (1.0 + (slope / scale) ** 2)
+    return np.asarray(np.abs(slope) < AGREE_RAD)

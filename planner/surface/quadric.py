@@ -20,7 +20,7 @@ from planner.surface.normals import tangent_frames
 TURN = 0.35
 # Beyond this residual (rad) a polynomial does not describe both sides of a node: the curvature jumps there.
 KINK_RAD = 0.004
-CHUNK_PAIRS = 400_000
+CHUNK_PAIRS = 60_000
 
 
 @dataclass(frozen=True, eq=False)
@@ -48,10 +48,11 @@ def two_rings(graph: csr_array) -> csr_array:
 
 def monomials(u: Array, v: Array, terms: int) -> Array:
     """Return 1, u, v, u2, uv, v2 (and u3, u2v, uv2, v3) as rows, (terms, n)."""
-    rows = [np.ones_like(u), u, v, u * u, u * v, v * v]
-    if terms == 10:
-        rows += [rows[3] * u, rows[3] * v, u * rows[5], v * rows[5]]
-    return np.stack(rows)
+    rows = np.ones((terms, len(u)))
+    rows[1], rows[2] = u, v
+    for row, (i, j) in enumerate(((1, 1), (1, 2), (2, 2), (3, 1), (3, 2), (1, 5), (2, 5))[: terms - 3], start=3):
+        np.multiply(rows[i], rows[j], out=rows[row])
+    return rows
 
 
 def fit_nodes(clusters: Clusters, rings: csr_array, nodes: NDArray[np.int64], terms: int, exact: bool) -> LocalFit:
@@ -84,19 +85,20 @@ def _fit(clusters: Clusters, rings: csr_array, nodes: NDArray[np.int64], terms: 
     row = np.repeat(np.arange(len(nodes)), sizes)
     normal = clusters.normals[nodes]
     first, second = tangent_frames(normal)
-    d = clusters.mean[other] - clusters.mean[nodes[row]]
-    f, s, m = first[row], second[row], normal[row]
+    d = clusters.mean[other] - np.repeat(clusters.mean[nodes], sizes, axis=0)
+    f, s, m = (np.repeat(axis, sizes, axis=0) for axis in (first, second, normal))
     u, v, h = (np.einsum("ij,ij->i", d, axis) for axis in (f, s, m))
     distance = np.sqrt(u * u + v * v + h * h)
     scale = np.maximum.reduceat(distance, starts)
     scale[scale == 0] = 1.0
-    k = scale[row]
+    k = np.repeat(scale, sizes)
     rho = distance / k
-    turn2 = 2.0 * (1.0 - np.einsum("ij,ij->i", clusters.normals[other], m))
+    turn2 = 2.0 - 2.0 * np.einsum("ij,ij->i", clusters.normals[other], m)
     phi = monomials(u / k, v / k, terms)
     if exact:
-        nearest = np.minimum.reduceat(np.where(rho > 0, rho, 1.0), starts)[row]
-        weight = np.exp(-turn2 / (2.0 * TURN) ** 2) / (rho + 0.3 * nearest) ** 4
+        nearest = np.repeat(np.minimum.reduceat(np.where(rho > 0, rho, 1.0), starts), sizes)
+        reach = np.square(rho + 0.3 * nearest)
+        weight = np.exp(turn2 * (-0.25 / TURN**2)) / (reach * reach)
         phi[0] = 0.0
     else:
         weight = clusters.count[other] * (1.05 - rho * rho) ** 2 * np.exp(-turn2 / TURN**2)
@@ -113,8 +115,9 @@ def _fit(clusters: Clusters, rings: csr_array, nodes: NDArray[np.int64], terms: 
         jumps = np.flatnonzero(slope_rms > KINK_RAD)
         if len(jumps):
             pair = np.concatenate([np.arange(starts[j], starts[j] + sizes[j]) for j in jumps])
+            adjacent = np.asarray(clusters.graph[nodes[row[pair]], other[pair]]).reshape(-1) > 0
             coefficients[jumps] = one_sided(
-                phi[:, pair], h[pair], weight[pair], rho[pair], sizes[jumps], coefficients[jumps]
+                phi[:, pair], h[pair], weight[pair], rho[pair], adjacent, sizes[jumps], coefficients[jumps]
             )
     full = np.zeros((len(nodes), 10))
     powers = np.array([0, 1, 1, 2, 2, 2, 3, 3, 3, 3])[:terms]

@@ -8,6 +8,7 @@ from scipy.sparse import csr_array, eye_array
 
 from planner.frames import Array
 from planner.surface.clusters import Clusters, cluster
+from planner.surface.flats import find_flats
 from planner.surface.normals import angle_weighted_normals, unit
 from planner.surface.quadric import LocalFit, fit_nodes, monomials, two_rings
 from planner.surface.topology import Index, edges_of, vertex_graph
@@ -37,20 +38,22 @@ def fit_vertices(vertices: Array, faces: Index, footprint_mm: float) -> VertexFi
     Vertices of a CAD tessellation are points of the true surface: they stay, and the polynomials go through them. A mesh
     finer than the footprint whose vertices scatter about such polynomials was measured: there the footprint averages.
     """
-    edges = edges_of(faces).vertices
+    edges = edges_of(faces)
     guess = angle_weighted_normals(vertices, faces)
-    points = Clusters(
-        np.arange(len(vertices)),
-        np.ones(len(vertices)),
-        vertices,
-        np.zeros((len(vertices), 6)),
-        guess,
-        vertex_graph(len(vertices), edges),
-    )
+    n = len(vertices)
+    flats = find_flats(vertices, faces, edges)
+    # Inside a planar face nothing is left to fit; what bends beyond its seam must not see across it.
+    inner = (edges.uses == 2) & (flats.face[edges.first] >= 0) & (flats.face[edges.first] == flats.face[edges.second])
+    graph = vertex_graph(n, edges.vertices[~inner])
+    points = Clusters(np.arange(n), np.ones(n), vertices, np.zeros((n, 6)), guess, graph)
     coarse = _mean_link_mm(points.graph, vertices) > COARSE * footprint_mm
     if _is_noisy(points, np.flatnonzero(~coarse)):
-        return _smooth(vertices, cluster(vertices, guess, edges, footprint_mm))
-    return _through(points, coarse)
+        return _smooth(vertices, cluster(vertices, guess, edges.vertices, footprint_mm))
+    fit = _through(points, coarse)
+    for corner in faces[flats.face >= 0].T:
+        fit.normals[corner] = flats.normals[flats.face[flats.face >= 0]]
+        fit.shape[corner] = 0.0
+    return fit
 
 
 def _is_noisy(points: Clusters, fine: NDArray[np.int64]) -> bool:
