@@ -1,0 +1,47 @@
+"""Readings of a calibration from CSV files, columns by name."""
+
+from pathlib import Path
+
+import numpy as np
+import polars as pl
+
+from planner.errors import fail
+from planner.frames import Array
+
+MAX_ROWS = 5_000_000
+
+
+def read_table(path: Path, required: tuple[str, ...], optional: tuple[str, ...] = ()) -> dict[str, Array]:
+    """Return the named columns of a CSV file as float64 (n,); absent optional ones are left out, empty cells are NaN.
+
+    Raises EchoBaseError `calibration-file` naming the column or the file.
+    """
+    try:
+        table = pl.read_csv(path, infer_schema_length=None, comment_prefix="#", n_rows=MAX_ROWS)
+    except (pl.exceptions.PolarsError, OSError, ValueError) as error:
+        raise fail(
+            "calibration-file", "The file cannot be read as CSV.", "Save it as CSV with a header.", path.name
+        ) from error
+    names = {name.strip().lower(): name for name in table.columns}
+    missing = [name for name in required if name not in names]
+    if missing:
+        raise fail(
+            "calibration-file",
+            f"The column {', '.join(missing)} is missing.",
+            f"The file needs the columns {', '.join(required)}"
+            + (f"; it may have {', '.join(optional)}." if optional else "."),
+            path.name,
+        )
+    columns = {}
+    for name in (*required, *optional):
+        if name not in names:
+            continue
+        try:
+            columns[name] = np.asarray(table[names[name]].cast(pl.Float64).fill_null(float("nan")).to_numpy())
+        except pl.exceptions.PolarsError as error:
+            raise fail(
+                "calibration-file", f"Column {name} holds something that is no number.", "Correct it.", path.name
+            ) from error
+    if table.height == 0:
+        raise fail("calibration-file", "The file has no rows.", "Record the readings again.", path.name)
+    return columns
