@@ -241,7 +241,7 @@ class ProjectView:
             "part": (stage.part, stage.surface),
             "surface": (stage.surface, stage.coverage),
             "setup": (stage.placement, stage.coverage),
-            "keypoints": (self._note, stage.keypoints),
+            "keypoints": (self._note, stage.surface, stage.keypoints),
             "plan": (stage.paths, stage.coverage),
             "scan": (stage.scan,),
             "alignment": (stage.alignment, stage.keypoints, stage.paths),

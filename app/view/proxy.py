@@ -20,7 +20,9 @@ from planner.errors import EchoBaseError
 router = APIRouter(include_in_schema=False)
 CLIENT_HTML = Path(viser.__file__).parent / "client" / "build" / "index.html"
 # viser reconnects only in a focused document, which a frame beside a form rarely is; its panels are replaced by our page.
-SHIM = """<script>document.hasFocus = () => !document.hidden;</script>
+# Its sorter of Gaussian splats, which EchoBase never shows, evaluates text and fails under the policy: not an error to report.
+SHIM = """<script>document.hasFocus = () => !document.hidden;
+addEventListener("unhandledrejection", (e) => { if (e.reason instanceof EvalError) e.preventDefault(); });</script>
 <style>[data-testid="floating-panel"], .mantine-Paper-root[style*="position: fixed"][style*="bottom: 0"]
 { display: none !important; }</style>
 """

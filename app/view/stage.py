@@ -18,6 +18,7 @@ from planner.frames import Array
 from planner.keypoint import KeyPoint
 from planner.part import Part
 from planner.placement import assume_nominal
+from planner.surface.inspection import InspectionSurface
 
 
 class Stage:
@@ -34,6 +35,7 @@ class Stage:
         self.legends: dict[str, Legend] = {}
         self.scan_by = "standoff"
         self._part: Part | None = None
+        self._surface: InspectionSurface | None = None
         self._labels: set[str] = set()
         self._frames = prepare(server)
 
@@ -78,6 +80,9 @@ class Stage:
     def surface(self) -> None:
         """Tint the inspection surface."""
         surface = self.model.surface()
+        if surface is not None and surface is self._surface:
+            return
+        self._surface = surface
         self.sheet = sheet_of(surface) if surface is not None else None
         if self.sheet is not None:
             draw_surface(self.server, self.sheet)

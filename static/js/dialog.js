@@ -35,18 +35,18 @@ export function askAcceptance(reasons) {
 }
 
 /** Ask for the hidden truth of a rehearsal. */
-export function askRehearsal(path, draw) {
+export function askRehearsal(path, draw, known) {
   const inputs = {};
   const six = h("div", { class: "six" }, AXES.map((axis) => {
     inputs[axis] = h("input", { type: "number", name: axis, step: "any", value: "0", required: true });
     return h("label", {}, `${axis.toUpperCase()} (${isAngle(axis) ? "deg" : "mm"})`, inputs[axis]);
   }));
-  const shuffle = () => { const offset = draw(); for (const axis of AXES) inputs[axis].value = String(offset[axis]); };
-  shuffle();
+  const shuffle = (offset = draw()) => { for (const axis of AXES) inputs[axis].value = String(offset[axis]); };
+  shuffle(known ?? draw());
   const hide = h("input", { type: "checkbox", name: "hide", onchange: () => six.classList.toggle("hidden", hide.checked) });
   const number = (name, text, value, props) => labelled(text, h("input", { type: "number", name, value, step: "any", ...props }));
   return ask("Rehearse with the simulated scanner", `The ${path} program runs on a simulated robot. The part stands away from where the program believes it is; the alignment has to find out by how much.`,
-    [six, h("div", { class: "row" }, button("Draw another", shuffle), h("label", { class: "row tight" }, hide, "Do not show me")),
+    [six, h("div", { class: "row" }, button("Draw another", () => shuffle()), h("label", { class: "row tight" }, hide, "Do not show me")),
       h("div", { class: "six" }, number("spring", "Spring back (mm)", "0", { min: -100, max: 100 }), number("outliers", "Outliers (%)", "0", { min: 0, max: 90 }), number("dropouts", "Dropouts (%)", "0", { min: 0, max: 90 }))],
     "Run", (f) => ({
       path,

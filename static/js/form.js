@@ -55,7 +55,7 @@ export function field({ key, path, schema, label }, value, saved, change) {
   const dirty = JSON.stringify(value ?? null) !== JSON.stringify(saved ?? null);
   const bounds = boundsText(schema, unit);
   const input = inputFor(schema, value, id, name, bounds, (v) => change(path, v));
-  return h("div", { class: `field ${dirty ? "dirty" : ""}` },
+  return h("div", { class: `field ${dirty ? "dirty" : ""} ${schema.type === "string" ? "text" : ""}` },
     h("label", { for: id, title: [schema.description, bounds].filter(Boolean).join("  ") }, label ?? title(key)),
     input, h("span", { class: "unit" }, unit));
 }
@@ -80,8 +80,11 @@ function inputFor(schema, value, id, name, bounds, change) {
       },
     });
   }
-  return h("input", { ...common, type: "text", value: value ?? "", pattern: schema.pattern, maxlength: schema.maxLength, onchange: (e) => e.target.reportValidity() && change(e.target.value) });
+  return h("input", { ...common, type: "text", value: value ?? "", pattern: patternOf(schema.pattern), maxlength: schema.maxLength, onchange: (e) => e.target.reportValidity() && change(e.target.value) });
 }
+
+// Browsers read patterns with the v flag, where a hyphen in a class must be escaped.
+const patternOf = (pattern) => pattern?.replace(/^\^|\$$/g, "").replaceAll("-]", "\\-]") ?? null;
 
 function boundsText(schema, unit) {
   const low = schema.minimum ?? schema.exclusiveMinimum;

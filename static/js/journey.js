@@ -27,7 +27,14 @@ export function journey(data) {
     alignment: !alignment ? TODO : stale(alignment, { tone: alignment.accepted ? "good" : toneOf(alignment.verdict), word: alignment.accepted ? "accepted" : alignment.verdict, fact: moved(alignment.correction) }),
     report: report(alignment, assessment),
   };
-  return STEPS.map(([id, name]) => ({ id, name, ...states[id] }));
+  const told = Object.fromEntries((data.state?.steps ?? []).map((s) => [s.name, s]));
+  return STEPS.map(([id, name]) => {
+    const state = { ...states[id] };
+    if (told[id]?.state === "running") Object.assign(state, { tone: "busy", word: "working" });
+    // What is not done yet says what to do.
+    if (!state.fact && state.tone === "todo" && told[id]?.state !== "empty") state.fact = told[id]?.next ?? "";
+    return { id, name, ...state };
+  });
 }
 
 /** Share of the inspection surface that a planned path covers, whatever the plan calls it. */

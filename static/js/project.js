@@ -16,7 +16,7 @@ const CONCERNS = {
   assessment: ["assessment"],
   project: ["project"],
 };
-const PATHS = { project: "", part: "/part", setup: "/setup", surface: "/surface", keypoints: "/keypoints", plan: "/plan", scans: "/scans", alignment: "/alignments", assessment: "/assessments" };
+const PATHS = { project: "", part: "/part", setup: "/setup", surface: "/surface", keypoints: "/keypoints", plan: "/plan", scans: "/scans", alignment: "/alignments", assessment: "/assessments", state: "/state" };
 const NEWEST = new Set(["alignment", "assessment"]);
 const ALL = ["project", "part", "setup", "surface", "keypoints", "plan", "scans", "alignment", "assessment"];
 
@@ -73,13 +73,23 @@ export class Project {
   }
 
   async fetchPending() {
-    const names = [...this.pending];
+    const names = new Set([...this.pending, "state"]);
     const done = this.loaded ?? [];
     this.pending.clear();
     this.loaded = [];
-    await Promise.all(names.map((name) => this.fetchOne(name)));
+    // The state says first what there is, so that nothing is asked for that does not exist.
+    await this.fetchOne("state");
+    names.delete("state");
+    await Promise.all([...names].map((name) => (this.exists(name) ? this.fetchOne(name) : (this.data[name] = null))));
     this.changed("data");
     for (const resolve of done) resolve();
+  }
+
+  exists(name) {
+    const { state } = this.data;
+    if (name === "part") return (state?.versions?.part ?? 0) > 0;
+    if (name === "plan") return state?.programs?.alignment?.error?.code !== "plan-missing";
+    return true;
   }
 
   async fetchOne(name) {
@@ -89,7 +99,7 @@ export class Project {
       this.data[name] = NEWEST.has(name) ? (answer.at(-1) ?? null) : answer;
     } catch (error) {
       if (error instanceof ApiError && [404, 409].includes(error.status)) this.data[name] = null;
-      if (name === "project" && error.status === 404) this.deleted = true;
+      if (["project", "state"].includes(name) && error.status === 404) this.deleted = true;
     }
   }
 

@@ -38,7 +38,7 @@ export async function drawStart(root) {
     h("div", { class: "cards" },
       card("Aerofoil", "A curved skin of about 1.5 m. Plan, rehearse with the simulated scanner, align, download.", button("Try the aerofoil", () => sample("aerofoil", "Aerofoil sample"), { class: "primary" })),
       card("Flat plate", "150 × 100 × 10 mm. Shows what a flat face can tell and what only its edges can.", button("Try the flat plate", () => sample("flat-plate", "Flat plate sample"), { class: "primary" })),
-      card("Your part", "STEP, STL, OBJ, PLY or GLB, and the cell it stands in.", h("div", { class: "row" }, button("New project", own, { class: "primary" }), button("Open an archive", () => archive.click()), archive))),
+      card("Your part", "STEP, STL, OBJ, PLY or GLB, and the cell it stands in.", h("div", { class: "stack" }, button("New project", own, { class: "primary" }), button("Open an archive", () => archive.click()), archive))),
     h("section", { class: "stack" }, h("h3", {}, "Projects"), list)));
   const draw = async () => {
     const projects = await attempt(() => get("/projects"));

@@ -64,7 +64,7 @@ export function draw(setup) {
 
 /** Ask for the hidden truth and run the simulated scanner. */
 export async function rehearse(shell, path) {
-  const body = await askRehearsal(path, draw(shell.project.data.setup));
+  const body = await askRehearsal(path, draw(shell.project.data.setup), shell.local.truth);
   if (body) { shell.local.truth = body.offset; await shell.do(async () => { await shell.project.run("/simulate", body); await shell.view.refresh(); }); }
 }
 
