@@ -12,6 +12,7 @@ from kuka_export.options import DEFAULT_OPTIONS, ProgramOptions
 from kuka_export.passes import blend_distance_mm, block_numbers, pass_chunks, style_of
 from kuka_export.preflight import (
     check_correction,
+    check_path,
     check_request,
     check_route,
     data_centroid_base_mm,
@@ -47,9 +48,10 @@ def build_program(
     profile = profile_of(setup.controller)
     corrected = T_base_basecorr is not None
     T_part = define_corrected(setup.T_base_partnom) if corrected else assume_nominal(setup.T_base_partnom)
+    issues = check_request(path, setup, profile, name, options) + check_path(path)
+    _stop_on_errors(issues)
     r = route(path, setup, options, T_part)
-    issues = check_request(path, setup, profile, name, options)
-    issues += check_route(r, path, (options.motion or profile.default_motion) == "spline")
+    issues += check_route(r, (options.motion or profile.default_motion) == "spline")
     _stop_on_errors(issues)
     centroid = data_centroid_base_mm(r, path, setup) if centroid_base_mm is None else centroid_base_mm
     issues += check_correction(setup, T_base_basecorr, centroid, r)

@@ -34,7 +34,7 @@ def check_files(files: dict[str, bytes], controller: str | None = None, library:
     for path, source in library.files.items():
         findings = [*check_bytes(files[path]), *_file(library, source, profile, controller, called, public)]
         found += [issue(source.name, f) for f in sorted(findings, key=lambda f: f.line)]
-    found += [issue(name, f) for name, f in check_modules(library)]
+    found += [issue(name, f) for name, f in check_modules(library, files)]
     return list(dict.fromkeys(found))
 
 

@@ -54,7 +54,7 @@ def blend_distance_mm(r: Route, family: Family, options: ProgramOptions) -> floa
     step = spacing_mm(r.poses)
     both = np.minimum(step, np.append(step[1:], np.inf))[blended]
     limit = 0.5 * float(both[both > 0.0].min(initial=math.inf))
-    value = math.floor(min(options.blend_mm, limit) * 1000.0) / 1000.0
+    value = math.floor(min(options.blend_mm, limit) * 1000.0 + 1e-6) / 1000.0
     return value if value >= 0.01 else 0.0
 
 

@@ -74,18 +74,19 @@ def check_request(path: ToolPath, setup: Setup, profile: Profile, name: str, opt
     return issues
 
 
-def check_route(r: Route, path: ToolPath, spline: bool) -> list[Issue]:
-    """Return what is wrong with the poses: none, not finite, repeated, too close or too far, data runs of one pose."""
-    if len(r) == 0:
+def check_path(path: ToolPath) -> list[Issue]:
+    """Return what makes a path unusable before a pose of it is computed: no poses, numbers that are none."""
+    if len(path) == 0:
         return [_error("krl-empty", "The path has no poses.", "Plan the path again.", "path")]
-    bad = np.flatnonzero(~np.isfinite(r.poses).all(axis=1))
+    bad = np.flatnonzero(~(np.isfinite(path.Ts_part_contact.matrix).all(axis=(1, 2)) & np.isfinite(path.standoff_mm)))
     if len(bad):
-        return [
-            _error(
-                "krl-not-finite", f"{len(bad)} poses are not numbers.", "Plan the path again; the surface is damaged there.",
-                _place(r, int(bad[0])),
-            )
-        ]  # fmt: skip
+        place = f"pass {int(path.pass_id[bad[0]]) + 1} pose {int(bad[0])}"
+        return [_error("krl-not-finite", f"{len(bad)} poses are not numbers.", "Plan the path again; the surface is damaged there.", place)]
+    return []
+
+
+def check_route(r: Route, spline: bool) -> list[Issue]:
+    """Return what is wrong with the poses: repeated, too close or too far, data runs of one pose, no data."""
     issues: list[Issue] = []
     issues += [
         _error(

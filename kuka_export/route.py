@@ -46,7 +46,7 @@ def route(path: ToolPath, setup: Setup, options: ProgramOptions, T_base_part: Tr
     """
     Ts_tcp = T_base_part @ path.Ts_part_tcp
     poses = (Ts_tcp @ tool_axes(setup.tool).inv()).xyzabc
-    keep = np.arange(len(path)) if not np.isfinite(poses).all() else without_repeats(poses, path.role)
+    keep = without_repeats(poses, path.role)
     role, pass_id = path.role[keep], path.pass_id[keep]
     scan = np.isin(role, _SCAN_ROLES)
     arrival = scan & ~(shifted(scan, False) & (shifted(pass_id, -1) == pass_id))

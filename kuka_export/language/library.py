@@ -50,12 +50,17 @@ def load(files: dict[str, bytes]) -> Library:
     for name, data in files.items():
         if not name.upper().endswith((".SRC", ".DAT", ".SUB")):
             continue
-        source = parse_file(PurePosixPath(name.replace("\\", "/")).name, data.decode("latin-1"))
+        source = parse_file(PurePosixPath(name.replace("\\", "/")).name, without_mark(data).decode("latin-1"))
         library.files[name] = source
         for k, routine in enumerate(source.routines):
             if routine.word != "DEFDAT" and (k == 0 or routine.is_global):
                 library.routines.setdefault(routine.name, (source, routine))
     return library
+
+
+def without_mark(data: bytes) -> bytes:
+    """Return the bytes behind a UTF-8 byte order mark, so that it hides nothing else."""
+    return data.removeprefix(b"\xef\xbb\xbf")
 
 
 def calls(routine: Routine) -> list[str]:

@@ -9,7 +9,6 @@ from kuka_export.language.nodes import (
     CallStatement,
     Control,
     Declaration,
-    Designator,
     Expression,
     External,
     Move,
@@ -303,9 +302,8 @@ def _section(c: Cursor, line: int) -> Control:
     word = c.next().value
     mark = c.expect("START", "PART", "END") if c.token.kind == "name" else ""
     parts: tuple[Expression, ...] = ()
-    if c.take("="):
-        parts = (expression(c),)
-    elif c.token.kind != "end":
+    c.take("=")
+    if c.token.kind != "end":
         parts = (expression(c),)
         c.take("ONSTART")
     return Control(line, f"{word} {mark}", parts)
@@ -314,8 +312,9 @@ def _section(c: Cursor, line: int) -> Control:
 def _io(c: Cursor, line: int) -> Control:
     word = c.next().value
     if c.take("ON"):
-        expression(c)
-        return Control(line, word)
+        target: Expression = designator(c)
+        c.expect("=")
+        return Control(line, word, (target, expression(c)))
     if c.take("OFF"):
         designator(c)
         return Control(line, word)
@@ -342,6 +341,13 @@ def label(c: Cursor) -> str:
     return ""
 
 
+def _brake(c: Cursor, line: int) -> Control:
+    c.next()
+    if c.token.value == "F":
+        c.next()
+    return Control(line, "BRAKE")
+
+
 _TABLE: dict[str, Callable[[Cursor, int], Statement]] = {
     "SPLINE": _spline, "PTP_SPLINE": _spline, "ENDSPLINE": _spline_end, "TRIGGER": _trigger, "PULSE": _pulse, "WAIT": _wait,
     "DECL": declaration, "GLOBAL": _global, "CONST": declaration, "STRUC": declaration, "ENUM": declaration,
@@ -350,17 +356,7 @@ _TABLE: dict[str, Callable[[Cursor, int], Statement]] = {
     "ELSE": _bare("ELSE"), "ENDIF": _bare("ENDIF"), "ENDFOR": _bare("ENDFOR"), "ENDWHILE": _bare("ENDWHILE"),
     "REPEAT": _bare("REPEAT"), "LOOP": _bare("LOOP"), "ENDLOOP": _bare("ENDLOOP"), "ENDSWITCH": _bare("ENDSWITCH"),
     "CASE": _case, "DEFAULT": _bare("DEFAULT"), "EXIT": _bare("EXIT"), "HALT": _bare("HALT"), "CONTINUE": _bare("CONTINUE"),
-    "RESUME": _bare("RESUME"), "BRAKE": lambda c, line: _brake(c, line), "RETURN": _return, "GOTO": _goto, "STOP": _stop_when,
+    "RESUME": _bare("RESUME"), "BRAKE": _brake, "RETURN": _return, "GOTO": _goto, "STOP": _stop_when,
     "TIME_BLOCK": _section, "CONST_VEL": _section, "ANIN": _io, "ANOUT": _io, "DIGIN": _io, "CWRITE": _io, "CREAD": _io,
     "COPEN": _io, "CCLOSE": _io, "SREAD": _io, "SWRITE": _io, "CONFIRM": _one("CONFIRM"), "IMPORT": _import,
 }  # fmt: skip
-
-
-def _brake(c: Cursor, line: int) -> Control:
-    c.next()
-    if c.token.value == "F":
-        c.next()
-    return Control(line, "BRAKE")
-
-
-__all__ = ["Designator", "declaration", "label", "statement"]

@@ -1,7 +1,7 @@
 """Rules of names: modules, routines, declarations, what is used without one."""
 
 import re
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from pathlib import PurePosixPath
 
 from kuka_export.language.library import Library
@@ -24,7 +24,7 @@ from kuka_export.rules.walk import expressions_of, nested
 
 MAX_NAME = 24
 MANY_ROUTINES = 200
-_MODULE = re.compile(r"[A-Z_][A-Z0-9_$]*\Z")
+_MODULE = re.compile(r"[A-Z_$][A-Z0-9_$]*\Z")
 _TYPE_WORDS = ("STRUC", "ENUM")
 
 
@@ -50,16 +50,13 @@ def check_module(source: SourceFile) -> Iterator[Finding]:
         yield Finding(1, "krl-local-routines", f"The module has {len(source.routines)} routines", "warning")
 
 
-def check_modules(library: Library) -> Iterator[tuple[str, Finding]]:
-    """Yield modules that exist twice: the controller has one name space over all folders."""
+def check_modules(library: Library, files: Mapping[str, bytes]) -> Iterator[tuple[str, Finding]]:
+    """Yield modules that exist twice with different text: the controller has one name space over all folders."""
     seen: dict[str, str] = {}
     for path, source in library.files.items():
         key = source.name.upper()
-        if key in seen:
-            yield (
-                source.name,
-                Finding(1, "krl-module-twice", f"{path} and {seen[key]} are the same module to the controller"),
-            )
+        if key in seen and files[path] != files[seen[key]]:
+            yield source.name, Finding(1, "krl-module-twice", f"{path} and {seen[key]} are one module to the controller, and differ")
         seen.setdefault(key, path)
 
 
@@ -67,7 +64,7 @@ def check_declarations(source: SourceFile, routine: Routine, data_names: set[str
     """Yield late and double declarations, values where none belong, and names that are too long."""
     is_data = routine.word == "DEFDAT"
     started = 0
-    seen = set(routine.parameters)
+    seen: set[str] = set()
     for s in routine.body:
         if isinstance(s, Declaration):
             if started and not is_data:
