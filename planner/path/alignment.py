@@ -36,6 +36,11 @@ def alignment_path(curved: CurvedSurface, keypoints: tuple[KeyPoint, ...], setup
     `alignment.edges` crossings are added until the edges on all sides are crossed and all six directions can be found.
     Raises `EchoBaseError` where no line over the surface joins two key points.
     """
+    return with_links(passes_through(curved, keypoints, setup), curved)
+
+
+def passes_through(curved: CurvedSurface, keypoints: tuple[KeyPoint, ...], setup: Setup) -> ToolPath:
+    """Return the alignment path as `alignment_path` does, without the links between its passes."""
     if not keypoints:
         raise fail(
             "keypoints-missing", "There are no key points.", "Pick at least three, or let EchoBase suggest them."
@@ -47,8 +52,8 @@ def alignment_path(curved: CurvedSurface, keypoints: tuple[KeyPoint, ...], setup
     edges = rim(curved.surface, _RIM_SPACING_MM)
     runs: list[Run] = []
     for members in strokes_through(keypoints, foot.points):
-        for stroke in _lines(curved, mesh, on_mesh[members], foot.normals[members], axes):
-            runs.append(finished(mesh, stroke, edges, setup))
+        strokes = _lines(curved, mesh, on_mesh[members], foot.normals[members], axes)
+        runs += [finished(mesh, stroke, edges, setup) for stroke in strokes]
     if setup.alignment.edges:
         runs += _crossings(curved, mesh, runs, edges, axes, setup)
     return _path(curved, mesh, runs, setup)
@@ -89,9 +94,9 @@ def _crossings(
     sides = np.stack([axes.along, -axes.along, axes.across, -axes.across])
     out = []
     for k in best_crossings(edges, edges.conormals[crossed], precision, sides, centre, setup):
-        run = _crossing(curved, mesh, edges, k, setup)
-        if run is not None:
-            out.append(run)
+        extra = _crossing(curved, mesh, edges, k, setup)
+        if extra is not None:
+            out.append(extra)
     return out
 
 
@@ -123,5 +128,4 @@ def _path(curved: CurvedSurface, mesh: PathMesh, runs: list[Run], setup: Setup) 
         points, normals, travel, curved.surface.part_faces[track.face], track.bary, track.run, over, setup, spacing
     )
     data = data.with_heading(headings(data.points, data.normals, data.travel, data.run, None))
-    path = assemble(data, "alignment", setup.alignment_standoff_mm, spacing)
-    return with_links(path, curved)
+    return assemble(data, "alignment", setup.alignment_standoff_mm, spacing)

@@ -1,6 +1,7 @@
 """Edges worth crossing: where the part ends beside the surface, and what each crossing tells about the part's place."""
 
 from dataclasses import dataclass
+from weakref import WeakKeyDictionary
 
 import numpy as np
 from numpy.typing import NDArray
@@ -28,7 +29,17 @@ class Rim:
 
 
 def rim(surface: InspectionSurface, spacing_mm: float) -> Rim:
-    """Return the middles of pieces of the boundary at most `spacing_mm` long."""
+    """Return the middles of pieces of the boundary at most `spacing_mm` long; kept as long as the surface lives."""
+    known = _KNOWN.setdefault(surface, {})
+    if spacing_mm not in known:
+        known[spacing_mm] = _rim(surface, spacing_mm)
+    return known[spacing_mm]
+
+
+_KNOWN: WeakKeyDictionary[InspectionSurface, dict[float, Rim]] = WeakKeyDictionary()
+
+
+def _rim(surface: InspectionSurface, spacing_mm: float) -> Rim:
     points, conormals, along, open_ = [], [], [], []
     for curve in boundary(surface):
         ahead = np.roll(curve.points, -1, axis=0) - curve.points
@@ -86,7 +97,7 @@ def best_crossings(
         @ whiten
     )
     current = whiten @ precision @ whiten
-    seen = [c for c in crossed]
+    seen = list(crossed)
     chosen: list[int] = []
     wanted = [d for d in directions if not any(float(c @ d) > 0.7 for c in seen)]
     while len(chosen) < most:

@@ -15,6 +15,7 @@ __all__ = ["snap", "suggest", "verdicts"]
 
 SNAP_MM = 2.0
 _SAME_MM = 0.5
+_MANY = 4
 
 
 def _feet(curved: CurvedSurface, keypoints: tuple[KeyPoint, ...]) -> Foot:
@@ -105,7 +106,21 @@ def verdicts(curved: CurvedSurface, keypoints: tuple[KeyPoint, ...], setup: Setu
                 )
             )
         out += _too_close(keypoints, foot, i, radius)
-    return out + _spread(foot)
+    return _gathered(out) + _spread(foot)
+
+
+def _gathered(issues: list[Issue]) -> list[Issue]:
+    """Return the issues, those that many key points share as one."""
+    out: list[Issue] = []
+    for code in dict.fromkeys(i.code for i in issues):
+        same = [i for i in issues if i.code == code]
+        if len(same) <= _MANY or same[0].severity == "error":
+            out += same
+            continue
+        ids = ", ".join(i.where.removeprefix("keypoints: ") for i in same)
+        text = f"{len(same)} key points, for one: {same[0].message}"
+        out.append(Issue(same[0].severity, code, text, same[0].remedy, f"keypoints: {ids}"))
+    return out
 
 
 def _too_close(keypoints: tuple[KeyPoint, ...], foot: Foot, i: int, radius: float) -> list[Issue]:

@@ -3,6 +3,7 @@
 from dataclasses import dataclass
 
 import numpy as np
+from numpy.typing import NDArray
 from scipy.ndimage import minimum_filter1d
 
 from planner.errors import fail
@@ -50,7 +51,7 @@ def step_field(v: Array, step_mm: Array, half_mm: Array, slope: Array, v_range: 
     )
 
 
-def _low(bin_of: Array, x: Array) -> Array:
+def _low(bin_of: NDArray[np.intp], x: Array) -> Array:
     """Return a low quantile of x in every bin, NaN where a bin is empty."""
     order = np.lexsort((x, bin_of))
     b = bin_of[order]

@@ -1,6 +1,8 @@
 """Moves between passes that stay clear of the part."""
 
-from dataclasses import dataclass, fields, replace
+from dataclasses import dataclass, replace
+from typing import Any
+from weakref import WeakKeyDictionary
 
 import igl
 import numpy as np
@@ -28,10 +30,14 @@ class _Body:
 
     @classmethod
     def of(cls, part: Part) -> "_Body":
+        known = _KNOWN.get(part)
+        if known is not None:
+            return known
         v, f = np.ascontiguousarray(part.vertices), np.ascontiguousarray(part.faces, dtype=np.int64)
         tree = igl.AABB()
         tree.init(v, f)
-        return cls(v, f, part.face_normals, tree)
+        body = _KNOWN[part] = cls(v, f, part.face_normals, tree)
+        return body
 
     def height(self, points: Array) -> tuple[Array, Array, Array]:
         """Return the distance (n,), negative behind the nearest triangle, that point (n, 3) and the way out (n, 3)."""
@@ -42,6 +48,10 @@ class _Body:
         outside = np.einsum("ij,ij->i", offset, normal) >= 0.0
         out = np.where((outside & (distance > 1e-6))[:, None], offset / np.maximum(distance, 1e-12)[:, None], normal)
         return np.where(outside, distance, -distance), near, out
+
+
+# Kept as long as the part lives: planners try many paths on one part.
+_KNOWN: WeakKeyDictionary[Part, _Body] = WeakKeyDictionary()
 
 
 def with_links(path: ToolPath, curved: CurvedSurface) -> ToolPath:
@@ -156,5 +166,5 @@ def _insert(path: ToolPath, points: Array, ups: Array, after: Ints) -> ToolPath:
         "face": np.full(k, -1, dtype=np.int32),
         "bary": np.zeros((k, 3)),
     }
-    arrays = {f.name: np.concatenate([getattr(path, f.name), more[f.name]])[order] for f in fields(path)[2:]}
+    arrays: dict[str, Any] = {name: np.concatenate([getattr(path, name), x])[order] for name, x in more.items()}
     return replace(path, Ts_part_contact=frames[order], **arrays)

@@ -32,14 +32,8 @@ def section(mesh: PathMesh, points: Array, normals: Array) -> list[Stroke]:
     Raises `EchoBaseError` where the line misses the points.
     """
     a, b = points[0], points[-1]
-    up = normals.mean(axis=0)
-    side = np.cross(up, b - a)
-    if np.linalg.norm(side) < 1e-9:
-        raise fail("section-degenerate", "Two key points lie above one another along the normal.", "Move one of them.")
-    side /= np.linalg.norm(side)
-    values = (mesh.vertices - a) @ side
-    cut = isolines(values, mesh.faces, mesh.other, np.array([0.0]))
-    # Higher values on the left: the line runs from b to a where the normal looks up; turn it round by cutting from below.
+    side = _plane_through(points, normals)
+    cut = isolines((mesh.vertices - a) @ side, mesh.faces, mesh.other, np.array([0.0]))
     if len(cut.level) == 0:
         raise fail("section-missing", "No line over the surface joins two key points.", "Move one of them.")
     lengths = measure(mesh, cut)
@@ -48,7 +42,8 @@ def section(mesh: PathMesh, points: Array, normals: Array) -> list[Stroke]:
     if max(da, db) > _REACH_MM:
         raise fail("section-missing", "The line over the surface misses a key point.", "Move it, or add one between.")
     if ca == cb:
-        return [_stroke(lengths, ca, sa, sb)]
+        middle = _foot(lengths, points[len(points) // 2])[1] if len(points) > 2 else None
+        return [_stroke(lengths, ca, sa, sb, middle)]
     toward = float(np.sign((b - a) @ (_at_end(lengths, ca, True) - _at_end(lengths, ca, False))))
     out = []
     for chain, s, leaves in ((ca, sa, True), (cb, sb, False)):
@@ -98,6 +93,22 @@ def together(strokes: list[Stroke]) -> Chains:
     )
 
 
+def _plane_through(points: Array, normals: Array) -> Array:
+    """Return the normal (3,) of the plane through the first and the last point that holds the normals best."""
+    d = points[-1] - points[0]
+    length = float(np.linalg.norm(d))
+    if length > 1e-9:
+        d = d / length
+        held = np.concatenate([normals, 10.0 / length * (points - points[0])])
+        held = held - np.outer(held @ d, d)
+        values, vectors = np.linalg.eigh(held.T @ held)
+        # The eigenvector of the largest value is the common upward direction square to the chord.
+        if values[2] > 1e-6:
+            side = np.cross(d, vectors[:, 2])
+            return np.asarray(side / np.linalg.norm(side))
+    raise fail("section-degenerate", "Two key points lie above one another along the normal.", "Move one of them.")
+
+
 def _foot(lengths: Lengths, p: Array) -> tuple[int, float, float]:
     """Return the chain nearest to a point, the arc length there and the distance."""
     d = lengths.b - lengths.a
@@ -114,8 +125,9 @@ def _at_end(lengths: Lengths, chain: int, last: bool) -> Array:
     return lengths.b[rows[-1]] if last else lengths.a[rows[0]]
 
 
-def _stroke(lengths: Lengths, chain: int, s0: float, s1: float) -> Stroke:
-    """Return the stretch of a chain from s0 to s1 as a line walked forwards; of a loop, the shorter way round."""
+def _stroke(lengths: Lengths, chain: int, s0: float, s1: float, middle: float | None = None) -> Stroke:
+    """Return the stretch of a chain from s0 to s1 as a line walked forwards; of a loop, the way over `middle`, or the
+    shorter one."""
     rows = np.flatnonzero(lengths.chains.chain == chain)
     c, total = lengths.chains, float(lengths.total[chain])
     line = Chains(
@@ -126,27 +138,30 @@ def _stroke(lengths: Lengths, chain: int, s0: float, s1: float) -> Stroke:
         np.zeros(1, dtype=np.int64),
         np.zeros(1, dtype=bool),
     )
-    if s0 > s1:
+    closed = bool(c.closed[chain])
+    around = s0 == 0.0 and s1 == total
+    if closed and not around:
+        onward = float(np.mod(s1 - s0, total))
+        turn = onward > total / 2.0 if middle is None else float(np.mod(middle - s0, total)) > onward
+    else:
+        turn = s0 > s1
+    if turn:
         line = replace(line, face=line.face[::-1], bary_in=line.bary_out[::-1], bary_out=line.bary_in[::-1])
         s0, s1 = total - s0, total - s1
-    if not c.closed[chain]:
+    if not closed:
         return Stroke(line, s0, s1, total)
-    return _opened(line, lengths, rows, s0, s1, total)
-
-
-def _opened(line: Chains, lengths: Lengths, rows: Ints, s0: float, s1: float, total: float) -> Stroke:
-    """Return a loop opened opposite the stretch asked for; the stretch is the shorter of the two ways."""
+    if around:
+        return Stroke(line, 0.0, total, total, loop=True)
     length = np.linalg.norm(lengths.b[rows] - lengths.a[rows], axis=1)
-    forwards = bool(
-        (line.face[0] == lengths.chains.face[rows[0]]) and (line.bary_in[0] == lengths.chains.bary_in[rows[0]]).all()
-    )
-    length = length if forwards else length[::-1]
-    if s1 - s0 > total / 2.0 and s1 - s0 < total * (1.0 - 1e-9):
-        line = replace(line, face=line.face[::-1], bary_in=line.bary_out[::-1], bary_out=line.bary_in[::-1])
-        length, s0, s1 = length[::-1], total - s0, total - s1 + total
+    return _opened(line, length[::-1] if turn else length, s0, float(np.mod(s1 - s0, total)))
+
+
+def _opened(line: Chains, length: Array, s0: float, span: float) -> Stroke:
+    """Return a loop opened opposite the stretch of `span` mm from s0 on; length (m,): of its segments."""
     ends = np.cumsum(length)
-    middle = np.mod((s0 + s1) / 2.0 + total / 2.0, total)
-    cut = int(np.mod(np.searchsorted(ends, middle), len(ends)))
+    total = float(ends[-1])
+    opening = float(np.mod(s0 + span / 2.0 + total / 2.0, total))
+    cut = min(int(np.searchsorted(ends, opening)), len(ends) - 1)
     before = float(ends[cut - 1]) if cut else 0.0
     line = replace(
         line,
@@ -154,7 +169,5 @@ def _opened(line: Chains, lengths: Lengths, rows: Ints, s0: float, s1: float, to
         bary_in=np.roll(line.bary_in, -cut, axis=0),
         bary_out=np.roll(line.bary_out, -cut, axis=0),
     )
-    a = float(np.mod(s0 - before, total))
-    span = min(s1 - s0, total)
-    a = 0.0 if a + span > total + 1e-9 else a
-    return Stroke(line, a, a + span, total, loop=True)
+    start = float(np.mod(s0 - before, total))
+    return Stroke(line, start, min(start + span, total), total, loop=True)

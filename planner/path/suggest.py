@@ -1,13 +1,13 @@
 """Key points suggested: on strips that cover what was asked and tell most about where the part is."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
 from planner.errors import fail
 from planner.frames import Array
 from planner.keypoint import KeyPoint
-from planner.path.alignment import alignment_path
+from planner.path.alignment import passes_through
 from planner.path.axes import ScanAxes, scan_axes
 from planner.path.coverage import swept_share
 from planner.path.crossings import PATCH_MM, PATCH_SIGMA_MM, prior_precision, rows
@@ -23,16 +23,20 @@ _SHARES = (0.35, 0.5, 0.65)
 _CLOSE_ENOUGH = 0.01
 _ROUNDS = 8
 _POINTS_WANTED = 12
+# Different for the two families, or the points of crossing strips would meet near the corners.
+_ALONG_INSET, _ACROSS_INSET = 1.2, 1.8
 
 
 @dataclass(frozen=True, eq=False)
 class _Strip:
-    """A stretch s0..s1 of a line over the surface; free: which ends (first, last) go on to the boundary."""
+    """A stretch s0..s1 of a line over the surface; free: which ends (first, last) go on to the boundary; inset: how many
+    search radii its points keep from there."""
 
     stroke: Stroke
     s0: float
     s1: float
     free: tuple[bool, bool]
+    inset: float = _ALONG_INSET
 
 
 def suggest(curved: CurvedSurface, setup: Setup, seed: int = 0) -> tuple[KeyPoint, ...]:
@@ -64,7 +68,7 @@ def suggest(curved: CurvedSurface, setup: Setup, seed: int = 0) -> tuple[KeyPoin
         strips = _strips(mesh, axes, share, length, setup, shift)
         points = _keypoints(curved, mesh, strips, setup) if strips else ()
         if points:
-            got = swept_share(curved, alignment_path(curved, points, setup), setup)
+            got = swept_share(curved, passes_through(curved, points, setup), setup)
             tried.append((length, got))
             if abs(got - asked) < best[0]:
                 best = (abs(got - asked), points)
@@ -92,8 +96,8 @@ def _next_length(tried: list[tuple[float, float]], length: float, asked: float) 
 def _strips(mesh: PathMesh, axes: ScanAxes, share: float, length: float, setup: Setup, shift: float) -> list[_Strip]:
     """Return strips of about this total length, `share` of it along the surface, the rest across."""
     out: list[_Strip] = []
-    for side, part in ((axes.across, share), (axes.along, 1.0 - share)):
-        out += _family(mesh, side, part * length, setup, shift)
+    for side, part, inset in ((axes.across, share, _ALONG_INSET), (axes.along, 1.0 - share, _ACROSS_INSET)):
+        out += [replace(s, inset=inset) for s in _family(mesh, side, part * length, setup, shift)]
     return out
 
 
@@ -101,7 +105,9 @@ def _family(mesh: PathMesh, side: Array, length: float, setup: Setup, shift: flo
     used = (mesh.vertices @ side)[mesh.faces]
     lo, hi = float(used.min()), float(used.max())
     probe = whole_lines(mesh, side, lo + (hi - lo) * np.linspace(0.15, 0.85, 7))
-    typical = float(np.median([s.length for s in probe]))
+    # Round a loop a strip goes less than half way, so that its two ends say which way.
+    usable = [0.45 * s.length if s.loop else s.length for s in probe]
+    typical = float(np.median(usable))
     least = min(2.5 * setup.alignment.search_radius_mm, 0.45 * typical)
     count = int(np.ceil(length / typical - 0.05))
     if count < 2:
@@ -110,18 +116,22 @@ def _family(mesh: PathMesh, side: Array, length: float, setup: Setup, shift: flo
     inset = 0.5 / count
     if count <= 3:
         inset = min(inset, 0.2)
-    inset = min(max(inset, 0.6 * setup.probe.swath_mm / max(hi - lo, 1e-9)), 0.5)
+    off = max(0.6 * setup.probe.swath_mm, 1.1 * setup.alignment.search_radius_mm)
+    inset = min(max(inset, off / max(hi - lo, 1e-9)), 0.45)
     at = np.linspace(inset, 1.0 - inset, count) if count > 1 else np.array([0.5])
     at = np.clip(at + shift / (2.0 * count), 0.02, 0.98)
     out = []
     for i, stroke in enumerate(whole_lines(mesh, side, lo + (hi - lo) * at)):
-        span = part * stroke.length
-        if part > 0.95 or stroke.length - span < min(EDGE_REACH_MM, stroke.length / 3.0):
-            out.append(_Strip(stroke, 0.0, stroke.length, (not stroke.loop, not stroke.loop)))
+        span = part * stroke.length * (0.45 if stroke.loop else 1.0)
+        if stroke.loop:
+            start = 0.5 * stroke.length * (i % 2)
+            out.append(_Strip(stroke, start, start + span, (False, False)))
+        elif part > 0.95 or stroke.length - span < min(EDGE_REACH_MM, stroke.length / 3.0):
+            out.append(_Strip(stroke, 0.0, stroke.length, (True, True)))
         elif i % 2 == 0:
-            out.append(_Strip(stroke, 0.0, span, (not stroke.loop, False)))
+            out.append(_Strip(stroke, 0.0, span, (True, False)))
         else:
-            out.append(_Strip(stroke, stroke.length - span, stroke.length, (False, not stroke.loop)))
+            out.append(_Strip(stroke, stroke.length - span, stroke.length, (False, True)))
     return out
 
 
@@ -158,7 +168,7 @@ def _places(curved: CurvedSurface, mesh: PathMesh, strip: _Strip, count: int, se
     """Return where on the strip its key points stand: off the edges by their search radius, off curved places."""
     radius = setup.alignment.search_radius_mm
     span = strip.s1 - strip.s0
-    off = min(1.2 * radius, 0.3 * span, 0.9 * EDGE_REACH_MM)
+    off = min(strip.inset * radius, 0.45 * span, 0.9 * EDGE_REACH_MM)
     a = strip.s0 + (off if strip.free[0] else 0.0)
     b = strip.s1 - (off if strip.free[1] else 0.0)
     count = int(np.clip(1 + (b - a) // (2.0 * radius), 2, count))

@@ -1,6 +1,7 @@
 """The order in which hand-picked key points are visited, and the strips that suggested ones belong to."""
 
 import re
+from itertools import pairwise
 
 import numpy as np
 
@@ -38,7 +39,7 @@ def strokes_through(keypoints: tuple[KeyPoint, ...], points: Array) -> list[list
     tour = [loose[i] for i in short_tour(points[loose])] if loose else []
     if len(tour) == 1:
         out.append(tour)
-    return out + [[a, b] for a, b in zip(tour[:-1], tour[1:], strict=True)]
+    return out + [[a, b] for a, b in pairwise(tour)]
 
 
 def short_tour(points: Array) -> list[int]:
