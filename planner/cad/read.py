@@ -25,8 +25,8 @@ PARSERS: dict[Format, str] = {
     "ply": "planner.cad.mesh_files:parse_ply",
     "glb": "planner.cad.mesh_files:parse_glb",
 }
-# Triangles and seconds of meshing a STEP file may take, and what is tried where even that is too much.
-STEP_BUDGETS = ((300_000, 12.0), (60_000, 5.0), (10_000, 2.0))
+# Triangles of a STEP file, and what is tried where these take too much memory or time.
+STEP_BUDGETS = (200_000, 40_000, 8_000)
 STEP_LIMITS = SandboxLimits(memory_mb=4096, cpu_s=120, wall_s=90.0)
 
 
@@ -81,8 +81,8 @@ def _parse(
     if kind != "step":
         return _named(source, kind, options, limits)
     last: EchoBaseError | None = None
-    for triangles, seconds in STEP_BUDGETS:
-        options |= {"max_triangles": triangles, "max_seconds": seconds}
+    for triangles in STEP_BUDGETS:
+        options["max_triangles"] = triangles
         try:
             arrays, meta = _named(source, kind, options, limits or STEP_LIMITS)
         except EchoBaseError as error:

@@ -1,7 +1,6 @@
 """STEP through Open CASCADE (cascadio): as fine as the budget allows, and nothing it complained about."""
 
 import re
-import time
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any
@@ -16,6 +15,8 @@ CHORD_PER_TOLERANCE = 1.74
 FINEST_MM = 0.006
 TOLERANCES_MM = (FINEST_MM, 0.012, 0.025, 0.05, 0.1, 0.2, 0.4, 1.0, 3.0)
 TURN_RAD = 0.12
+# Of a GLB of large meshes: half a vertex with its normal, three indices.
+BYTES_PER_TRIANGLE = 30.0
 _COMPLAINT = re.compile(r"\bERR\b|\bFails?\b|\bError\b|exception|Unresolved", re.IGNORECASE)
 _UNITS = {"": "m", ".CENTI.": "cm", ".MILLI.": "mm"}
 
@@ -23,8 +24,8 @@ _UNITS = {"": "m", ".CENTI.": "cm", ".MILLI.": "mm"}
 def parse(source: Path, options: dict[str, Any]) -> tuple[dict[str, NDArray[Any]], dict[str, Any]]:
     """Return vertices (v, 3) and faces (f, 3) in mm of a STEP file, and the tolerance used. Runs in the sandbox.
 
-    options: name, max_triangles, max_seconds (of meshing). Two coarse passes tell how triangles and time grow with a
-    finer tolerance; the finest one of `TOLERANCES_MM` that fits both budgets is used.
+    options: name, max_triangles. Two coarse passes tell how their number grows with a finer tolerance; the finest one of
+    `TOLERANCES_MM` that fits is used.
     """
     import cascadio  # noqa: PLC0415  a second of imports that only STEP needs
 
@@ -46,7 +47,7 @@ def parse(source: Path, options: dict[str, Any]) -> tuple[dict[str, NDArray[Any]
         return glb
 
     coarse = glb_mesh(mesh(1.0, 0.5), name)
-    tolerance = _tolerance(mesh, _diagonal_mm(coarse["vertices"]), options)
+    tolerance = _tolerance(mesh, _diagonal_mm(coarse["vertices"]), int(options["max_triangles"]))
     arrays = glb_mesh(mesh(tolerance, TURN_RAD if tolerance < 0.1 else 0.3), name)
     arrays["vertices"] = arrays["vertices"] * 1000.0
     return arrays, {"kind": "STEP", "tolerance_mm": tolerance, "file_unit": file_unit(data)}
@@ -74,22 +75,14 @@ def _diagonal_mm(vertices_m: NDArray[np.float64]) -> float:
     return float(1000.0 * np.linalg.norm(np.ptp(vertices_m, axis=0)))
 
 
-def _tolerance(mesh: Callable[[float, float], bytes], diagonal_mm: float, options: dict[str, Any]) -> float:
-    """Return the finest tolerance (mm) that is expected to stay inside the budgets of triangles and seconds."""
-    passes = []
-    for tolerance, turn in ((diagonal_mm / 2000.0, 0.5), (diagonal_mm / 8000.0, 0.25)):
-        start = time.perf_counter()
-        size = len(mesh(max(tolerance, FINEST_MM), turn))
-        passes.append((size, time.perf_counter() - start))
-    (n1, _), (n2, s2) = passes
-    # Of the size of the mesh: bytes grow like triangles, near 30 bytes each. Growth per halving of the tolerance, at most
-    # that of a doubly curved surface; time grows a little faster than size.
-    power = float(np.clip(np.log(max(n2 / n1, 1.0)) / np.log(4.0), 0.1, 1.0))
-    reached = max(diagonal_mm / 8000.0, FINEST_MM)
+def _tolerance(mesh: Callable[[float, float], bytes], diagonal_mm: float, max_triangles: int) -> float:
+    """Return the finest tolerance (mm) that is expected to stay within so many triangles. No clock: same file, same mesh."""
+    tried = [(max(diagonal_mm / share, FINEST_MM), turn) for share, turn in ((2000.0, 0.5), (8000.0, 0.25))]
+    before, after = (len(mesh(tolerance, turn)) / BYTES_PER_TRIANGLE for tolerance, turn in tried)
+    # Triangles per halving of the tolerance: at most double, on a doubly curved surface.
+    power = float(np.clip(np.log(max(after / before, 1.0)) / np.log(4.0), 0.1, 1.0))
+    reached = tried[1][0]
     for tolerance in TOLERANCES_MM:
-        growth = max(reached / tolerance, 1e-3)
-        triangles = n2 / 30.0 * growth**power
-        seconds = max(s2, 1e-3) * growth ** (1.5 * power)
-        if triangles <= options["max_triangles"] and seconds <= options["max_seconds"]:
+        if after * (reached / tolerance) ** power <= max_triangles:
             return tolerance
     return TOLERANCES_MM[-1]

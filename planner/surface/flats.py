@@ -48,15 +48,18 @@ def find_flats(vertices: Array, faces: Index, edges: Edges) -> Flats:
     graph = coo_array((np.ones(int(inside.sum()), dtype=np.int8), (a[inside], b[inside])), shape=(f, f))
     regions, region = connected_components(graph, directed=False)
     total = np.bincount(region, area, regions)
-    around = np.bincount(region[edges.first], length, regions)
-    around[:] += np.bincount(region[b], length[pair], regions)
-    around -= 2.0 * np.bincount(region[a[inside]], length[pair[inside]], regions)
+    around = np.bincount(region[edges.first], length, regions) + np.bincount(region[b], length[pair], regions)
+    around = around - 2.0 * np.bincount(region[a[inside]], length[pair[inside]], regions)
     width = 2.0 * total / np.maximum(around, 1e-30)
     bends = ~inside & (turn < CREASE_RAD) & (region[a] != region[b])
     i, j, turn, length = region[a[bends]], region[b[bends]], turn[bends], length[pair[bends]]
     flat = _runs_into_strips(np.r_[i, j], np.r_[j, i], np.r_[turn, turn], np.r_[length, length], width)
+    # One triangle alone may be a large facet of a curved face; a planar face of a CAD model has at least two.
+    flat &= np.bincount(region, minlength=regions) > 1
     number = np.where(flat, np.cumsum(flat) - 1, -1)
-    normals = np.stack([np.bincount(region, area * normal[:, k], regions) for k in range(3)], axis=1)
+    normals = np.zeros((regions, 3))
+    for k in range(3):
+        normals[:, k] = np.bincount(region, area * normal[:, k], regions)
     return Flats(number[region].astype(np.int64), unit(normals[flat]))
 
 
