@@ -30,7 +30,7 @@ def page(bare, chromium):
     until(page, lambda: len(bare.view.browsers) == 1, what="the view's connection")
     browser = bare.view.browsers.chosen(None)[0]
     until(page, lambda: browser.moved, what="the first framing")
-    browser.client.get_render(40, 60, timeout=60.0)
+    until(page, lambda: picture(page).std() > 10, what="the part on screen")
     yield page
     page.close()
 
@@ -43,14 +43,18 @@ def on_screen(bare, x, y):
     return project(camera, in_base * 1e-3, SIZE["width"], SIZE["height"]), place
 
 
-def settled(bare):
-    # A render is answered after everything sent before it.
-    bare.view.browsers.chosen(None)[0].client.get_render(20, 30, timeout=60.0)
+def looking(bare, page, view):
+    """Turn the camera and wait until the browser itself reports the new place."""
+    camera = bare.view.browsers.chosen(None)[0].client.camera
+    command(bare, camera=view)
+    asked = camera.update_timestamp
+    until(page, lambda: camera.update_timestamp > asked, what="the camera's answer")
+    page.wait_for_timeout(150)
 
 
 def test_clicks_become_key_points_where_they_were_made(bare, page):
-    command(bare, step="keypoints", pick="keypoints", camera="top")
-    settled(bare)
+    command(bare, step="keypoints", pick="keypoints")
+    looking(bare, page, "top")
     places = [(-200.0, -60.0), (30.0, 70.0), (210.0, -20.0)]
     for i, (x, y) in enumerate(places):
         pixel, _ = on_screen(bare, x, y)
@@ -72,8 +76,7 @@ def test_clicks_become_key_points_where_they_were_made(bare, page):
     page.mouse.click(8, SIZE["height"] - 8)
     page.wait_for_timeout(400)
     assert len(bare.model.keypoints().points) == 3
-    command(bare, camera="top")
-    settled(bare)
+    looking(bare, page, "top")
     page.mouse.dblclick(*on_screen(bare, -100.0, 30.0)[0])
     until(page, lambda: len(bare.model.keypoints().points) == 4, what="the fourth point")
     page.wait_for_timeout(300)
@@ -92,8 +95,8 @@ def test_clicks_become_key_points_where_they_were_made(bare, page):
 
 
 def test_a_click_off_the_inspection_surface_says_why(bare, page):
-    command(bare, step="keypoints", pick="keypoints", camera="bottom")
-    settled(bare)
+    command(bare, step="keypoints", pick="keypoints")
+    looking(bare, page, "bottom")
     page.mouse.click(*on_screen(bare, 0.0, 0.0)[0])
     until(page, lambda: any(e == "view-error" for e, _ in bare.model.published), what="the explanation")
     told = next(data for event, data in bare.model.published if event == "view-error")
