@@ -5,6 +5,7 @@ from weakref import WeakKeyDictionary
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.spatial import cKDTree
 
 from planner.frames import Array
 from planner.setup import Setup
@@ -12,9 +13,10 @@ from planner.surface.boundary import EdgeKind, boundary
 from planner.surface.inspection import InspectionSurface
 
 # What one reading of an edge, and one patch of surface, is worth (mm, one sigma); only their ratio to the fixture counts.
-EDGE_SIGMA_MM = 0.15
+EDGE_SIGMA_MM = 0.1
 PATCH_SIGMA_MM = 0.05
 PATCH_MM = 10.0
+_SETTLED = 0.15
 
 
 @dataclass(frozen=True, eq=False)
@@ -76,18 +78,31 @@ def edge_rows(points: Array, conormals: Array, along: Array, centre: Array, setu
     return rows(at, np.repeat(conormals, 3, axis=0), centre).reshape(-1, 3, 6) / EDGE_SIGMA_MM
 
 
+def _off_corners(rim_: Rim, free: NDArray[np.intp], room: float) -> NDArray[np.bool_]:
+    """Return which of the points `free` leave room for the array beside them; if none does, those with the most."""
+    p, c = rim_.points, rim_.conormals
+    distance = np.full(len(free), np.inf)
+    near = cKDTree(p).query_ball_point(p[free], room)
+    for i, members in enumerate(near):
+        other = np.array(members)[(c[members] @ c[free[i]]) < 0.8]
+        if len(other):
+            distance[i] = np.linalg.norm(p[other] - p[free[i]], axis=1).min()
+    return np.asarray(distance >= min(room, 0.95 * float(distance.max())))
+
+
 def best_crossings(
     rim_: Rim, crossed: Array, precision: Array, directions: Array, centre: Array, setup: Setup, most: int = 8
 ) -> list[int]:
     """Return the points of the rim to cross besides those crossed already (k, 3, conormals), best first.
 
     One for each of the `directions` (4, 3) in which the part has an end and nothing crosses it yet; then more while some
-    direction of motion stays at more than a tenth of the fixture's prior. precision (6, 6): prior plus all that the path
+    direction of motion stays at more than `_SETTLED` of the fixture's prior. precision (6, 6): prior plus all that the path
     measures without them. Each is the one that shrinks the posterior, whitened by the prior, the most (A-optimal).
     """
     free = np.flatnonzero(rim_.open)
     if not len(free):
         return []
+    free = free[_off_corners(rim_, free, 0.6 * setup.probe.swath_mm)]
     whiten = np.diag(1.0 / np.sqrt(np.diag(prior_precision(setup))))
     blocks = (
         whiten
@@ -103,7 +118,7 @@ def best_crossings(
     while len(chosen) < most:
         wanted = [d for d in wanted if not any(float(c @ d) > 0.7 for c in seen)]
         faces = [d for d in wanted if bool((rim_.conormals[free] @ d > 0.7).any())]
-        settled = float(np.linalg.eigvalsh(np.linalg.inv(current)).max()) < 0.1**2
+        settled = float(np.linalg.eigvalsh(np.linalg.inv(current)).max()) < _SETTLED**2
         if not faces and settled:
             break
         cost = np.trace(np.linalg.inv(current + blocks), axis1=1, axis2=2)

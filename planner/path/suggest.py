@@ -119,7 +119,7 @@ def _family(mesh: PathMesh, side: Array, length: float, setup: Setup, shift: flo
     off = max(0.6 * setup.probe.swath_mm, 1.1 * setup.alignment.search_radius_mm)
     inset = min(max(inset, off / max(hi - lo, 1e-9)), 0.45)
     at = np.linspace(inset, 1.0 - inset, count) if count > 1 else np.array([0.5])
-    at = np.clip(at + shift / (2.0 * count), 0.02, 0.98)
+    at = np.clip(at + shift * (at[1] - at[0] if count > 1 else 0.5), 0.5 * inset, 1.0 - 0.5 * inset)
     out = []
     for i, stroke in enumerate(whole_lines(mesh, side, lo + (hi - lo) * at)):
         span = part * stroke.length * (0.45 if stroke.loop else 1.0)
@@ -176,15 +176,16 @@ def _places(curved: CurvedSurface, mesh: PathMesh, strip: _Strip, count: int, se
     if b - a < 4.0 * radius:
         return want
     fine = np.linspace(a, b, 81)
-    _, bary, face = positions(mesh, strip.stroke.line, fine)
+    on_line, bary, face = positions(mesh, strip.stroke.line, fine)
+    clear = ~(mesh.boundary_distance(on_line, radius) < radius)
     bend = np.abs(np.linalg.eigvalsh(curved.shape_operator(face.astype(np.int32), bary))).max(axis=1)
     fixed = (not strip.free[0], not strip.free[1])
     for i in range(count):
         if (i == 0 and fixed[0]) or (i == count - 1 and fixed[1]):
             continue
         near = np.flatnonzero(np.abs(fine - want[i]) <= 0.15 * (b - a))
-        good = near[bend[near] * radius**2 / 4.0 <= setup.tolerances.position_mm]
-        pick = good[np.abs(fine[good] - want[i]).argmin()] if len(good) else near[bend[near].argmin()]
+        good = near[(bend[near] * radius**2 / 4.0 <= setup.tolerances.position_mm) & clear[near]]
+        pick = good[np.abs(fine[good] - want[i]).argmin()] if len(good) else near[(bend[near] + ~clear[near]).argmin()]
         if not (len(good) and abs(fine[pick] - want[i]) < (b - a) / 80.0):
             want[i] = fine[pick]
     return np.asarray(want)
