@@ -95,7 +95,7 @@ class Correction:
             "dof": {name: {"status": a.status, "sigma": a.sigma} for name, a in zip(AXES, self.axes, strict=False)},
             "covariance": None if self.covariance is None else self.covariance.tolist(),
             "centroid_mm": None if self.centroid_mm is None else self.centroid_mm.tolist(),
-            "directions": [_direction(d) for d in self.directions],
+            "directions": [d.to_json() for d in self.directions],
             "keypoints": [_keypoint(k) for k in self.keypoints],
             "residual": None if self.residual is None else vars(self.residual),
             "prediction": {
@@ -117,17 +117,6 @@ def _pose(transform: Transform | None) -> dict[str, float] | None:
         return None
     names = (f"{k}_mm" if k in "xyz" else f"{k}_deg" for k in AXES)
     return dict(zip(names, (float(v) for v in transform.xyzabc), strict=True))
-
-
-def _direction(d: Direction) -> dict[str, Any]:
-    return {
-        "status": d.status,
-        "sigma": d.sigma,
-        "vector": d.vector.tolist(),
-        "displacement_mm": d.displacement_mm,
-        "turn_deg": d.turn_deg,
-        "locked": d.locked,
-    }
 
 
 def _keypoint(k: KeyPointMatch) -> dict[str, Any]:

@@ -54,7 +54,7 @@ def align(
     found = align_map(cloud, curved, setup, edges is not False)
     if isinstance(found, Captured):
         return _nothing(cloud, problem, baseline, found, method)
-    issues = [*cloud.issues, *found.issues, *diagnose_fit(cloud, problem, found)]
+    issues = [*cloud.issues, *diagnose_fit(cloud, problem, found)]
     if not found.converged:
         issues.append(
             Issue(

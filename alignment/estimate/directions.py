@@ -1,7 +1,7 @@
 """What the scan can and cannot tell: directions held, weak or measured, and the named axes they touch."""
 
 from dataclasses import dataclass
-from typing import Literal
+from typing import Any, Literal
 
 import numpy as np
 
@@ -32,6 +32,17 @@ class Direction:
     displacement_mm: float
     turn_deg: float
     locked: bool = False
+
+    def to_json(self) -> dict[str, Any]:
+        """Return an entry of `directions` in correction.json."""
+        return {
+            "status": self.status,
+            "sigma": self.sigma,
+            "vector": self.vector.tolist(),
+            "displacement_mm": self.displacement_mm,
+            "turn_deg": self.turn_deg,
+            "locked": self.locked,
+        }
 
 
 def held_basis(covariance: Array, lock_rows: Array) -> Array:

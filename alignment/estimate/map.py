@@ -1,6 +1,6 @@
 """The MAP estimate: where the part most probably is, given the distances, the edges, the fixture and the noise."""
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
@@ -10,27 +10,29 @@ from alignment.cloud import PointCloud
 from alignment.estimate.capture import Captured, capture
 from alignment.estimate.cells import cells_along_passes, cells_in_space
 from alignment.estimate.directions import Direction, directions, held_basis
-from alignment.estimate.mixture import mixture, solve
+from alignment.estimate.edge_points import edge_points, locate
+from alignment.estimate.edge_rows import EdgeMap
+from alignment.estimate.mixture import Mixture, Posterior, mixture, solve
 from alignment.estimate.noise_fit import NoiseFit, fit_noise, noise_prior
-from alignment.estimate.noise_rows import noise_rows
 from alignment.estimate.patches import Patches, condense
 from alignment.estimate.pose_line import PoseLine, pose_line
 from alignment.estimate.problem import Problem
-from alignment.estimate.robust import mad_sigma, tukey_weights
-from alignment.estimate.surface_rows import Rows, patch_rows
+from alignment.estimate.robust_fit import robust_fit
+from alignment.estimate.surface_rows import Rows
+from alignment.estimate.system import BIAS_SHARE, LAG_SIGMA_MM, EdgeData, System
 from planner.frames import Array, Transform
-from planner.issues import Issue
 from planner.setup import Setup
+from planner.surface.boundary import boundary
 from planner.surface.curved import CurvedSurface
 
 CELL_MM = 8.0
 MOST_CELLS = 30_000
-ROBUST_STEPS = 30
-ROBUST_FLOOR_MM = 0.01
-# Beyond this many robust standard deviations a patch belongs to something else.
-REJECT = 5.0
-SOLVE_STEPS = 8
+SOLVE_STEPS = 10
 SOLVED_MM = 2e-5
+# Directions turn with the part as held ones go back to nominal; they are judged again where it came to rest.
+ROUNDS = 2
+# Noise models that are enough to step with; the last round takes them all.
+FEW = 8
 
 
 @dataclass(frozen=True, eq=False)
@@ -38,7 +40,7 @@ class MapFit:
     """The estimate and all that is needed to judge it.
 
     covariance (6, 6): of xi = (rx, ry, rz, x, y, z), rad and mm, axes of base, about `centre_mm`, held directions at their
-    prior. rows: residuals of `patches`; used (p,): those the estimate rests on.
+    prior. rows: residuals of `patches`; used (p,): those the estimate rests on. edges: what the crossings say, or None.
     """
 
     T_base_part: Transform
@@ -52,7 +54,14 @@ class MapFit:
     captured: Captured
     converged: bool
     edges: dict[str, Any] | None = None
-    issues: tuple[Issue, ...] = field(default=())
+
+
+@dataclass(frozen=True, eq=False)
+class State:
+    """A placement, and the edges' bias, lag and phase (3,) or nothing (0,), in their sigmas."""
+
+    T_base_part: Transform
+    nuisance: Array
 
 
 def align_map(cloud: PointCloud, curved: CurvedSurface, setup: Setup, edges: bool = True) -> MapFit | Captured:
@@ -61,49 +70,51 @@ def align_map(cloud: PointCloud, curved: CurvedSurface, setup: Setup, edges: boo
     captured = capture(cloud, problem)
     if not captured.converged:
         return captured
-    patches = condense_cloud(cloud, problem, captured.T_base_part)
-    T, used, settled = robust_fit(patches, problem, captured.T_base_part)
-    if used.sum() < 6:
+    line = None if cloud.beams_base is None else pose_line(cloud, setup.probe)
+    patches = condense_cloud(cloud, problem, captured.T_base_part, line)
+    crossed = edge_data(cloud, problem, line) if edges else None
+    robust = robust_fit(patches, problem, captured.T_base_part, crossed)
+    if robust.edges is not None:
+        # Now that the edges are known, so is the angle at which they were crossed.
+        known = robust.edges.rows(problem, robust.T_base_part)
+        sharper = locate(robust.edges.points, known.cosine, setup.probe.beam_width_mm)
+        robust = robust_fit(patches, problem, robust.T_base_part, replace(robust.edges, points=sharper))
+    if robust.used.sum() < 6:
         return captured
-    rows = patch_rows(patches, curved, T, problem.centre_mm(T))
+    system = System(problem, patches, robust.used, robust.edges)
+    state = State(robust.T_base_part, np.zeros(system.unknowns - 6))
     size = float(np.ptp(curved.surface.vertices, axis=0).max())
-    swath = setup.probe.swath_mm
-
-    def system(T_now: Transform):
-        now = patch_rows(patches, curved, T_now, problem.centre_mm(T_now))
-        return noise_rows(patches, now, used, problem.prior_sigma, swath)
-
-    prior = noise_prior(patches.sigma_mm, size)
-    first = system(T)
-    noise = fit_noise(first, prior)
-    mix = mixture(first, noise)
-    T, _ = _settle(T, system, mix, problem, np.zeros((6, 0)))
-    final = system(T)
-    mix = mixture(final, noise)
-    held = held_basis(solve(mix, final.r, problem.total(T), np.zeros((6, 0))).covariance, problem.lock_rows(T))
-    T, converged = _settle(T, system, mix, problem, held)
-    # Directions turn with the part: judge them where it came to rest.
-    final = system(T)
-    mix = mixture(final, noise)
-    free = solve(mix, final.r, problem.total(T), np.zeros((6, 0)))
-    held = held_basis(free.covariance, problem.lock_rows(T))
-    T, converged = _settle(T, system, mix, problem, held)
-    post = solve(mix, system(T).r, problem.total(T), held)
-    rows = patch_rows(patches, curved, T, problem.centre_mm(T))
+    rows = system.rows(state.T_base_part, state.nuisance)
+    noise = fit_noise(rows, noise_prior(patches.sigma_mm, size, setup.probe.swath_mm))
+    mix = mixture(rows, noise, FEW)
+    state, _ = _settle(state, system, mix, np.zeros((6, 0)))
+    for i in range(ROUNDS):
+        T = state.T_base_part
+        mix = mixture(system.rows(T, state.nuisance), noise, FEW if i < ROUNDS - 1 else None)
+        free = _solve(state, system, mix, np.zeros((6, 0)))
+        held = held_basis(free.covariance[:6, :6], problem.lock_rows(T))
+        state, converged = _settle(state, system, mix, held)
+    T = state.T_base_part
+    post = _solve(state, system, mix, held)
     scale = problem.prior_sigma
-    found = directions(post.covariance, held, problem.lock_rows(T), scale, problem.moments_base(T), setup.tolerances)
+    covariance = post.covariance[:6, :6]
+    found = directions(covariance, held, problem.lock_rows(T), scale, problem.moments_base(T), setup.tolerances)
+    now = system.surface(T)
     return MapFit(
-        T,
-        problem.centre_mm(T),
-        post.covariance * np.outer(scale, scale),
-        found,
-        patches,
-        rows,
-        used & rows.valid,
-        noise,
-        captured,
-        settled and converged,
-    )
+        T, problem.centre_mm(T), covariance * np.outer(scale, scale), found, patches, now, robust.used & now.valid,
+        noise, captured, robust.settled and converged, _edge_report(state, system, post),
+    )  # fmt: skip
+
+
+def edge_data(cloud: PointCloud, problem: Problem, line: PoseLine | None) -> EdgeData | None:
+    """Return the crossings of a cloud and the CAD edges they may belong to; None where there is nothing to match."""
+    if line is None:
+        return None
+    edges = EdgeMap(boundary(problem.curved.surface))
+    points = edge_points(cloud, line, problem.setup.probe)
+    if len(edges) == 0 or len(points) == 0:
+        return None
+    return EdgeData(points, edges, np.zeros(len(points), dtype=bool), BIAS_SHARE * problem.setup.probe.beam_width_mm)
 
 
 def condense_cloud(
@@ -123,34 +134,38 @@ def condense_cloud(
     return condense(cloud, cells, problem.curved, T_base_part, setup.alignment.point_model)
 
 
-def robust_fit(patches: Patches, problem: Problem, start: Transform) -> tuple[Transform, NDArray[np.bool_], bool]:
-    """Return the placement of a robust fit to patches, the patches that belong to the part, and whether it settled."""
-    T, settled = start, False
-    used = np.zeros(len(patches), dtype=bool)
-    weight = np.minimum(patches.count, 50.0) / (1.0 + np.minimum(patches.count, 50.0))
-    for _ in range(ROBUST_STEPS):
-        rows = patch_rows(patches, problem.curved, T, problem.centre_mm(T))
-        valid = rows.valid
-        if valid.sum() < 6:
-            return T, valid, False
-        r, x = rows.r[valid], rows.jacobian[valid] * problem.prior_sigma
-        sigma = mad_sigma(r, ROBUST_FLOOR_MM, about_zero=True)
-        used = valid.copy()
-        used[valid] = np.abs(r) < REJECT * sigma
-        w = weight[valid] * tukey_weights(r, sigma) / (0.1 + sigma) ** 2
-        z = np.linalg.solve((x * w[:, None]).T @ x + np.eye(6), -(x * w[:, None]).T @ r - problem.total(T))
-        T = problem.step(T, z)
-        if problem.moves_mm(z) < 1e-3:
-            settled = True
-            break
-    return T, used, settled
+def _solve(state: State, system: System, mix: Mixture, held: Array) -> Posterior:
+    """Return the posterior at a state; held (6, h) are directions of the motion."""
+    rows = system.rows(state.T_base_part, state.nuisance)
+    z = np.r_[system.problem.total(state.T_base_part), state.nuisance]
+    wide = np.vstack([held, np.zeros((system.unknowns - 6, held.shape[1]))])
+    return solve(mix, rows.r, z, wide)
 
 
-def _settle(T: Transform, system, mix, problem: Problem, held: Array) -> tuple[Transform, bool]:
+def _settle(state: State, system: System, mix: Mixture, held: Array) -> tuple[State, bool]:
     """Step until the part no longer moves, with the noise as it is."""
+    moves = np.inf
     for _ in range(SOLVE_STEPS):
-        step = solve(mix, system(T).r, problem.total(T), held).step
-        T = problem.step(T, step)
-        if problem.moves_mm(step) < SOLVED_MM:
-            return T, True
-    return T, problem.moves_mm(step) < 100 * SOLVED_MM
+        step = _solve(state, system, mix, held).step
+        moves = system.problem.moves_mm(step[:6])
+        state = State(system.problem.step(state.T_base_part, step[:6]), state.nuisance + step[6:])
+        if moves < SOLVED_MM:
+            break
+    return state, moves < 100.0 * SOLVED_MM
+
+
+def _edge_report(state: State, system: System, post: Posterior) -> dict[str, Any] | None:
+    if system.edges is None:
+        return None
+    found = system.edges.rows(system.problem, state.T_base_part)
+    used = system.edges.used
+    sigma = np.sqrt(np.diag(post.covariance)[6:])
+    return {
+        "crossings": len(used),
+        "used": int(used.sum()),
+        "rms_mm": float(np.sqrt(np.mean(found.r[used] ** 2))),
+        "bias_mm": float(state.nuisance[0] * system.edges.bias_sigma_mm),
+        "bias_sigma_mm": float(sigma[0] * system.edges.bias_sigma_mm),
+        "lag_mm": float(state.nuisance[1] * LAG_SIGMA_MM),
+        "lag_sigma_mm": float(sigma[1] * LAG_SIGMA_MM),
+    }

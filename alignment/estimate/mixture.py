@@ -11,7 +11,7 @@ from alignment.estimate.noise_rows import NoiseRows
 from planner.frames import Array
 
 # Draws lighter than this share of the heaviest change nothing.
-LIGHT = 1e-3
+LIGHT = 3e-3
 
 
 @dataclass(frozen=True, eq=False)
@@ -39,10 +39,12 @@ class Posterior:
     covariance: Array
 
 
-def mixture(rows: NoiseRows, fit: NoiseFit) -> Mixture:
-    """Return the least-squares operators of the noise models of a fit."""
+def mixture(rows: NoiseRows, fit: NoiseFit, most: int | None = None) -> Mixture:
+    """Return the least-squares operators of the noise models of a fit; of the heaviest `most` of them, if given."""
     kernel = Kernel(rows)
     kept = np.flatnonzero(fit.weights > LIGHT * fit.weights.max())
+    if most is not None:
+        kept = np.sort(kept[np.argsort(-fit.weights[kept], kind="stable")[:most]])
     solved, information, weights = [], [], []
     for i in kept:
         lower = factor(kernel.covariance(fit.draws[i]))

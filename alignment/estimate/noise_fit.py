@@ -10,33 +10,51 @@ scan; the mixture says so where plugging in the mode would not.
 from dataclasses import dataclass
 
 import numpy as np
-from scipy.linalg import LinAlgError, cho_solve, solve_triangular
+from scipy.linalg import cho_solve, solve_triangular
 from scipy.stats import norm, qmc
 
 from alignment.estimate.noise_kernel import NAMES, Kernel
 from alignment.estimate.noise_rows import NoiseRows
 from planner.frames import Array
 
-DRAWS = 64
+DRAWS = 128
 STEPS = 25
 # The likelihood of the noise must not lean on where the part was expected: prior this many times wider.
 WIDE = 10.0
-PROPOSAL_WIDTH = 1.15
+PROPOSAL_WIDTH = 1.2
+# How far out, in Gaussian standard deviations, the tails are looked at, and how much they may stretch.
+PROBE = 2.0
+STRETCH_LIMITS = (0.6, 3.0)
 
 
 @dataclass(frozen=True, eq=False)
 class NoisePrior:
-    """Log-normal priors: centre (9,) and spread (9,) of the logarithms, in the order of `noise_kernel.NAMES`."""
+    """Split normals of the logarithms, in the order of `noise_kernel.NAMES`: mode, spread below and above it, (9,) each."""
 
     centre: Array
-    spread: Array
+    below: Array
+    above: Array
+
+    def precision(self, theta: Array) -> Array:
+        """Return the inverse variances (9,) on the side where theta (9,) is."""
+        return np.where(theta < self.centre, self.below, self.above) ** -2.0
+
+    def log_density(self, theta: Array) -> Array:
+        """Return the terms (9,) of the logarithm of the density, but for a constant."""
+        return -0.5 * self.precision(theta) * (theta - self.centre) ** 2
 
 
-def noise_prior(scatter_mm: float, part_size_mm: float) -> NoisePrior:
-    """Return what is believed before seeing a residual: a robot of 0.03 mm that wanders over some cm, a stiff part."""
-    centre = [scatter_mm, 0.03, 60.0, 60.0, 0.003, 0.003, 0.25 * part_size_mm, 0.1, 0.05]
-    spread = [0.7, 1.0, 1.6, 1.5, 1.0, 1.3, 0.8, 1.0, 1.0]
-    return NoisePrior(np.log(centre), np.array(spread))
+def noise_prior(scatter_mm: float, part_size_mm: float, swath_mm: float) -> NoisePrior:
+    """Return what is believed before seeing a residual.
+
+    A robot that wanders by a few hundredths of a millimetre and thousandths of a degree, hardly less but easily more,
+    over lengths from millimetres to the size of the part; a part whose form differs from CAD by microns or by much more.
+    """
+    tilt = np.radians(0.005) * 0.5 * swath_mm
+    centre = [scatter_mm, 0.03, 60.0, 60.0, max(tilt, 1e-4), 0.002, 0.25 * part_size_mm, 0.1, 0.04]
+    below = [0.7, 0.5, 1.6, 1.5, 0.5, 1.0, 0.8, 1.0, 0.7]
+    above = [0.7, 1.2, 1.6, 1.5, 1.2, 1.5, 0.8, 1.0, 1.2]
+    return NoisePrior(np.log(centre), np.array(below), np.array(above))
 
 
 @dataclass(frozen=True, eq=False)
@@ -63,24 +81,44 @@ def fit_noise(rows: NoiseRows, prior: NoisePrior, draws: int = DRAWS) -> NoiseFi
     active = list(kernel.active)
     theta = prior.centre.copy()
     theta = _mode(kernel, rows, prior, theta)
-    information = _fisher(kernel, rows, theta) + np.diag(prior.spread[active] ** -2.0)
-    root = np.linalg.cholesky(np.linalg.inv(information))
+    information = _fisher(kernel, rows, theta) + np.diag(prior.precision(theta)[active])
+    value, vector = np.linalg.eigh(np.linalg.inv(information))
+    root = vector * np.sqrt(value)
+    stretch = _stretch(kernel, rows, prior, theta, root)
     unit = norm.ppf(qmc.Sobol(len(active), scramble=True, rng=np.random.default_rng(20260)).random(draws))
-    unit[0] = 0.0
+    side = np.where(unit >= 0.0, stretch[0], stretch[1])
     samples = np.tile(theta, (draws, 1))
-    samples[:, active] += PROPOSAL_WIDTH * unit @ root.T
+    samples[:, active] += PROPOSAL_WIDTH * (unit * side) @ root.T
     log_weight = np.array([_log_posterior(kernel, rows, prior, sample) for sample in samples])
-    log_weight += 0.5 * (unit**2).sum(axis=1)
+    log_weight += (0.5 * unit**2 + np.log(side)).sum(axis=1)
     weights = np.exp(log_weight - log_weight.max())
     weights /= weights.sum()
     return NoiseFit(theta, samples, weights, float(1.0 / (weights**2).sum()))
+
+
+def _stretch(kernel: Kernel, rows: NoiseRows, prior: NoisePrior, theta: Array, root: Array) -> Array:
+    """Return how much wider than Gaussian the posterior is to either side along each of its axes (2, d).
+
+    Split normals, as H. Rue, S. Martino, N. Chopin, J. R. Statist. Soc. B 71 (2009) 319,
+    doi:10.1111/j.1467-9868.2008.00700.x, use them for skewed hyper-parameters.
+    """
+    active = list(kernel.active)
+    top = _log_posterior(kernel, rows, prior, theta)
+    out = np.ones((2, root.shape[1]))
+    for i in range(root.shape[1]):
+        for side, sign in enumerate((1.0, -1.0)):
+            trial = theta.copy()
+            trial[active] += sign * PROBE * root[:, i]
+            drop = top - _log_posterior(kernel, rows, prior, trial)
+            out[side, i] = np.clip(PROBE / np.sqrt(2.0 * max(drop, 1e-3)), *STRETCH_LIMITS)
+    return out
 
 
 def factor(k: Array) -> Array | None:
     """Return the lower Cholesky factor, or None if K is not positive definite to rounding."""
     try:
         return np.linalg.cholesky(k)
-    except LinAlgError:
+    except np.linalg.LinAlgError:
         return None
 
 
@@ -93,8 +131,7 @@ def _log_posterior(kernel: Kernel, rows: NoiseRows, prior: NoisePrior, theta: Ar
     inner = np.linalg.cholesky(xw.T @ xw + np.eye(rows.x.shape[1]) / WIDE**2)
     explained = solve_triangular(inner, xw.T @ rw, lower=True)
     value = -np.log(np.diag(lower)).sum() - np.log(np.diag(inner)).sum() - 0.5 * (rw @ rw - explained @ explained)
-    u = (theta[active] - prior.centre[active]) / prior.spread[active]
-    return float(value - 0.5 * u @ u)
+    return float(value + prior.log_density(theta)[active].sum())
 
 
 def _projector(rows: NoiseRows, k: Array) -> tuple[Array, float] | None:
@@ -113,7 +150,6 @@ def _projector(rows: NoiseRows, k: Array) -> tuple[Array, float] | None:
 def _mode(kernel: Kernel, rows: NoiseRows, prior: NoisePrior, theta: Array) -> Array:
     """Climb to the mode by damped average-information steps."""
     active = list(kernel.active)
-    precision = prior.spread[active] ** -2.0
     damping, best, here = 1e-2, -np.inf, theta
     step = np.zeros(len(active))
     at: tuple[Array, Array] | None = None
@@ -122,13 +158,14 @@ def _mode(kernel: Kernel, rows: NoiseRows, prior: NoisePrior, theta: Array) -> A
         trial[active] += step
         k, by = kernel.with_derivatives(trial)
         found = _projector(rows, k)
-        u = trial[active] - prior.centre[active]
-        value = -np.inf if found is None else found[1] - 0.5 * (precision * u) @ u
+        value = -np.inf if found is None else found[1] + float(prior.log_density(trial)[active].sum())
         if found is not None and value >= best - 1e-9:
             gain = value - best
             p, best, here = found[0], value, trial
             pr = p @ rows.r
             pulled = np.stack([d @ pr for d in by])
+            precision = prior.precision(trial)[active]
+            u = trial[active] - prior.centre[active]
             gradient = np.array([-0.5 * np.vdot(p, d) for d in by]) + 0.5 * pulled @ pr - precision * u
             at = (gradient, 0.5 * pulled @ p @ pulled.T + np.diag(precision))
             damping = max(damping * 0.3, 1e-4)

@@ -29,6 +29,7 @@ NAMES = (
 NUGGET, PATH, LENGTH, GAP, TILT, FIELD, FIELD_LENGTH, EDGE_NUGGET, EDGE_PATH = range(len(NAMES))
 # Mean distance between two points of a rectangle, per its diagonal (0.37 for a square).
 MEAN_DISTANCE = 0.37
+FAR_MM = 1e9
 
 
 @dataclass(frozen=True, eq=False)
@@ -38,9 +39,13 @@ class Kernel:
     rows: NoiseRows
 
     @cached_property
-    def _distance2(self) -> Array:
+    def _distance(self) -> Array:
+        """Distances (n, n), never shorter than within a cell, mm; infinite to and from edges, which know no form error."""
         d = squareform(pdist(self.rows.position_base))
-        return d**2 + (MEAN_DISTANCE * self.rows.size_mm) ** 2
+        d = np.sqrt(d**2 + (MEAN_DISTANCE * self.rows.size_mm) ** 2)
+        d[self.rows.edge] = FAR_MM
+        d[:, self.rows.edge] = FAR_MM
+        return d
 
     @cached_property
     def _pass_step(self) -> Array:
@@ -55,12 +60,12 @@ class Kernel:
         return np.maximum(np.maximum(a[:, None] - b[None, :], a[None, :] - b[:, None]), 0.0)
 
     @cached_property
-    def _pair(self) -> tuple[Array, Array]:
-        """Products of places on the array (n, n) for surface rows, and which pairs are both edge rows."""
-        surface = ~self.rows.edge
-        across = np.where(surface, self.rows.across, 0.0)
-        edge = self.rows.edge.astype(np.float64)
-        return np.outer(across, across), np.outer(edge, edge)
+    def _pair(self) -> tuple[Array, Array, Array | None]:
+        """Pairs of surface rows, products of their places on the array, and pairs of edge rows: (n, n) each."""
+        surface = (~self.rows.edge).astype(np.float64)
+        across = np.where(self.rows.edge, 0.0, self.rows.across)
+        both = np.outer(self.rows.edge, self.rows.edge).astype(np.float64) if self.rows.edge.any() else None
+        return np.outer(surface, surface), np.outer(across, across), both
 
     @cached_property
     def active(self) -> tuple[int, ...]:
@@ -81,17 +86,14 @@ class Kernel:
         small = width < 1e-4
         mean = np.where(small, 1.0 - 0.5 * width, -np.expm1(-safe) / safe)
         own = np.where(small, 1.0 - width / 3.0, 2.0 * (safe + np.expm1(-safe)) / safe**2)
-        c = np.exp(-(self._apart + gap_mm * self._pass_step) / length_mm) * np.outer(mean, mean)
+        c = np.exp((self._apart + gap_mm * self._pass_step) / -length_mm)
+        c *= np.outer(mean, mean)
         np.fill_diagonal(c, own)
-        return c[np.ix_(self.rows.block, self.rows.block)]
+        return c.take(self.rows.block, axis=0).take(self.rows.block, axis=1)
 
     def field_correlation(self, length_mm: float) -> Array:
         """Return the correlation (n, n) of the form error; edges measure something else."""
-        c = np.exp(-np.sqrt(self._distance2) / length_mm)
-        if self.rows.edge.any():
-            surface = (~self.rows.edge).astype(np.float64)
-            c = c * np.outer(surface, surface)
-        return c
+        return np.exp(self._distance / -length_mm)
 
     def covariance(self, theta: Array) -> Array:
         """Return K (n, n), mm2."""
@@ -108,24 +110,29 @@ class Kernel:
         by: dict[int, Array] = {}
         nugget = np.where(rows.edge, 0.0, v[NUGGET] ** 2 / rows.count)
         diagonal = nugget.copy()
-        k = v[FIELD] ** 2 * self.field_correlation(v[FIELD_LENGTH])
+        k = self.field_correlation(v[FIELD_LENGTH])
+        k *= v[FIELD] ** 2
         if derivatives:
             by[NUGGET] = np.diag(2.0 * nugget)
             by[FIELD] = 2.0 * k
-            by[FIELD_LENGTH] = k * (np.sqrt(self._distance2) / v[FIELD_LENGTH])
+            by[FIELD_LENGTH] = k * (self._distance / v[FIELD_LENGTH])
         if rows.has_path:
-            x, both = self._pair
-            surface = 1.0 - np.maximum(rows.edge[:, None], rows.edge[None, :])
-            scale = v[PATH] ** 2 * surface + v[TILT] ** 2 * x + v[EDGE_PATH] ** 2 * both
+            surface, x, both = self._pair
+            scale = v[PATH] ** 2 * surface
+            scale += v[TILT] ** 2 * x
+            if both is not None:
+                scale += v[EDGE_PATH] ** 2 * both
             c = self.path_correlation(v[LENGTH], v[GAP])
-            k = k + scale * c
             if derivatives:
+                h = 1e-4
                 by[PATH] = 2.0 * v[PATH] ** 2 * surface * c
                 by[TILT] = 2.0 * v[TILT] ** 2 * x * c
-                by[EDGE_PATH] = 2.0 * v[EDGE_PATH] ** 2 * both * c
-                h = 1e-4
+                if both is not None:
+                    by[EDGE_PATH] = 2.0 * v[EDGE_PATH] ** 2 * both * c
                 by[LENGTH] = scale * (self.path_correlation(v[LENGTH] * np.exp(h), v[GAP]) - c) / h
                 by[GAP] = scale * (self.path_correlation(v[LENGTH], v[GAP] * np.exp(h)) - c) / h
+            scale *= c
+            k += scale
         if rows.edge.any():
             edge = np.where(rows.edge, v[EDGE_NUGGET] ** 2 / rows.count, 0.0)
             diagonal = diagonal + edge

@@ -9,7 +9,7 @@ from alignment.estimate.patches import Patches
 from alignment.estimate.surface_rows import Rows
 from planner.frames import Array
 
-TARGET_ROWS = 420
+TARGET_ROWS = 320
 MOST_BANDS = 3
 
 

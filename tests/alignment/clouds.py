@@ -47,8 +47,10 @@ def wander(rng, passes, spacing_mm, length_mm, columns=6, reset=False):
 
 def disc_share(surface, u, v, xa, ya, width_mm):
     """Share of a disc-shaped beam that falls on the part."""
-    k = np.arange(61)
-    radius, angle = np.sqrt((k + 0.5) / 61) * width_mm / 2, k * 2.399963
+    k = np.arange(40)
+    radius, angle = np.sqrt((k + 0.5) / 40) * width_mm / 2, k * 2.399963
+    # Each point with its opposite, so that the half way point of the beam is its middle exactly.
+    radius, angle = np.r_[radius, radius], np.r_[angle, angle + np.pi]
     du, dv = surface.derivatives(u, v)
     a, b, c = (du * du).sum(1), (du * dv).sum(1), (dv * dv).sum(1)
     det = a * c - b * b
@@ -57,7 +59,7 @@ def disc_share(surface, u, v, xa, ya, width_mm):
         offset = r * np.cos(t) * xa + r * np.sin(t) * ya
         e, f = (offset * du).sum(1), (offset * dv).sum(1)
         share += surface.inside(u + (c * e - b * f) / det, v + (a * f - b * e) / det)
-    return share / 61
+    return share / len(radius)
 
 
 def scan(

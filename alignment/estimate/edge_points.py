@@ -1,0 +1,229 @@
+"""Where the echo falls to half: crossings of the part's edges, along the passes and across the laws.
+
+Half the amplitude (-6 dB) means half of the beam on the part, so its middle stands over the edge. Between two readings
+the place is found on the beam's own S-curve, which the scan itself shows, not on a chord.
+"""
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.ndimage import median_filter, uniform_filter
+from scipy.optimize import nnls
+from scipy.special import ndtri
+
+from alignment.cloud import PointCloud
+from alignment.estimate.pose_line import PoseLine
+from planner.frames import Array
+from planner.probe import law_offsets_mm
+from planner.setup import Probe
+
+# Readings farther apart than this do not bracket an edge closely enough (mm).
+MOST_GAP_MM = 6.0
+# Around a reading, how far its plateau is looked for along the pass and across the laws (mm).
+PLATEAU_ALONG_MM, PLATEAU_ACROSS_MM = 12.0, 6.0
+# Shares of the plateau beyond which the S-curve says nothing about the place.
+SHARE_LIMITS = (0.02, 0.98)
+CURVE_LIMITS = (0.08, 0.92)
+
+
+@dataclass(frozen=True, eq=False)
+class EdgePoints:
+    """k crossings between two readings each, one on the part and one off it.
+
+    on_base, off_base (k, 3): where their laws stand, mm; share_on, share_off (k,): their amplitudes over the plateau.
+    window (k, 8): shares from three readings further on to three further off the part, NaN where there are none.
+    at (k,): place of the edge from on (0) to off (1). travel_base (k, 3): unit direction of travel. along (k,): True if
+    found along the pass, False if across the laws. pass_id, s_mm, law (k,).
+    """
+
+    on_base: Array
+    off_base: Array
+    share_on: Array
+    share_off: Array
+    window: Array
+    at: Array
+    travel_base: Array
+    along: NDArray[np.bool_]
+    pass_id: NDArray[np.int32]
+    s_mm: Array
+    law: Array
+
+    def __len__(self) -> int:
+        return len(self.at)
+
+    @property
+    def gap_mm(self) -> Array:
+        """Distance between the two readings (k,), mm."""
+        return np.asarray(np.linalg.norm(self.off_base - self.on_base, axis=1))
+
+    @property
+    def origins_base(self) -> Array:
+        """Where a law stands when half its beam is on the part (k, 3), mm."""
+        return self.on_base + self.at[:, None] * (self.off_base - self.on_base)
+
+    @property
+    def outward_base(self) -> Array:
+        """Unit direction (k, 3) from on to off the part."""
+        gap = self.gap_mm
+        return (self.off_base - self.on_base) / np.where(gap > 0, gap, 1.0)[:, None]
+
+
+def edge_points(cloud: PointCloud, line: PoseLine, probe: Probe) -> EdgePoints:
+    """Return all crossings of a cloud that knows amplitudes; none otherwise."""
+    if cloud.beams_base is None or cloud.arrays_base is None or not np.isfinite(cloud.amplitude_pct).any():
+        return _none()
+    share = _shares(cloud, line, probe)
+    if share is None:
+        return _none()
+    x = law_offsets_mm(probe)
+    step = np.abs(np.diff(line.s_mm))
+    same = (np.diff(line.pass_id) == 0) & line.present[1:] & line.present[:-1] & (step < MOST_GAP_MM) & (step > 1e-6)
+    i, k = np.nonzero(_crosses(share[:-1], share[1:]) & same[:, None])
+    j, h = np.nonzero(_crosses(share[:, :-1], share[:, 1:]) & line.present[:, None])
+    pose = np.column_stack([np.r_[i, j], np.r_[i + 1, j]])
+    law = np.column_stack([np.r_[k, h], np.r_[k, h + 1]])
+    swap = share[pose[:, 0], law[:, 0]] < share[pose[:, 1], law[:, 1]]
+    pose[swap], law[swap] = pose[swap, ::-1], law[swap, ::-1]
+    origin = [line.position_base[pose[:, c]] + x[law[:, c]][:, None] * line.array_base[pose[:, c]] for c in (0, 1)]
+    found = EdgePoints(
+        origin[0],
+        origin[1],
+        share[pose[:, 0], law[:, 0]],
+        share[pose[:, 1], law[:, 1]],
+        _windows(share, line, pose, law),
+        np.full(len(pose), 0.5),
+        line.travel_base[pose[:, 0]],
+        np.repeat([True, False], [len(i), len(j)]),
+        line.pass_id[pose[:, 0]],
+        line.s_mm[pose].mean(axis=1),
+        law.mean(axis=1),
+    )
+    return locate(found, np.ones(len(found)), probe.beam_width_mm)
+
+
+def _shares(cloud: PointCloud, line: PoseLine, probe: Probe) -> Array | None:
+    """Return the amplitude of every pose and law over its plateau (m, laws): 0 where no echo came back."""
+    m, laws = len(line.present), probe.laws
+    amplitude = np.zeros((m, laws))
+    known = np.zeros((m, laws), dtype=bool)
+    value = np.nan_to_num(cloud.amplitude_pct)
+    amplitude[cloud.pose_index, cloud.law - 1] = value
+    known[cloud.pose_index, cloud.law - 1] = np.isfinite(cloud.amplitude_pct)
+    known[cloud.lost_pose_index, cloud.lost_law - 1] = True
+    usual = float(np.median(value[value > 0])) if (value > 0).any() else 0.0
+    if usual <= 0.0:
+        return None
+    spacing = max(line.spacing_mm, 1e-3)
+    along = 2 * max(1, round(PLATEAU_ALONG_MM / spacing)) + 1
+    across = 2 * max(1, round(PLATEAU_ACROSS_MM / probe.pitch_mm)) + 1 if laws > 1 else 1
+    out = np.zeros((m, laws))
+    for first, last in _runs(line):
+        part = slice(first, last)
+        a, k = amplitude[part], known[part]
+        a = _mend(a, k, usual)
+        plateau = np.full(a.shape, usual)
+        for level in (0.5, 0.85):
+            loud = a > level * plateau
+            weight = uniform_filter(loud.astype(np.float64), (along, across), mode="constant")
+            total = uniform_filter(np.where(loud, a, 0.0), (along, across), mode="constant")
+            plateau = np.where(weight > 1e-9, total / np.maximum(weight, 1e-9), plateau)
+        out[part] = np.minimum(a / plateau, 1.5)
+    return out
+
+
+def _runs(line: PoseLine) -> list[tuple[int, int]]:
+    cut = np.flatnonzero(np.diff(line.pass_id) != 0) + 1
+    return list(zip(np.r_[0, cut], np.r_[cut, len(line.pass_id)], strict=True))
+
+
+def _mend(a: Array, known: NDArray[np.bool_], usual: float) -> Array:
+    """Replace what contradicts its neighbours, an echo lost by chance or a splash, by their median.
+
+    Only readings on the other side of half amplitude than their neighbours' median are touched: edges stay where they are.
+    """
+    size = (3, 3) if a.shape[1] > 1 else (5, 1)
+    middle = median_filter(a, size=size, mode="nearest")
+    odd = ((a > 0.5 * usual) != (middle > 0.5 * usual)) | ~known
+    # A second look with the first mends in place, so that neighbours lost together do not outvote the rest.
+    mended = np.where(odd, middle, a)
+    middle = median_filter(mended, size=size, mode="nearest")
+    odd = (a > 0.5 * usual) != (middle > 0.5 * usual)
+    return np.where(odd | ~known, middle, a)
+
+
+def _crosses(a: Array, b: Array) -> NDArray[np.bool_]:
+    return (a > 0.5) != (b > 0.5)
+
+
+def locate(points: EdgePoints, cosine: Array, beam_width_mm: float) -> EdgePoints:
+    """Return the crossings with their places found anew; cosine (k,): of the angle between their step and the conormal.
+
+    Each of the two readings places the edge by its own share on the S-curve, the steeper part counting more; with both on
+    the curve, its width all but cancels. Where both are off it, half way is all there is.
+    """
+    low, high = SHARE_LIMITS
+    gap = np.maximum(points.gap_mm * np.clip(cosine, 0.2, 1.0), 1e-9)
+    curve = _fit_curve(points, gap, beam_width_mm)
+    f, g = (np.clip(v, low, high) for v in (points.share_on, points.share_off))
+    x_on, x_off = curve @ _inverse(f), -(curve @ _inverse(g))
+    weight_on, weight_off = (np.exp(-(ndtri(v) ** 2)) for v in (f, g))
+    on_curve = [
+        (points.share_on < high) & (points.share_on > low),
+        (points.share_off < high) & (points.share_off > low),
+    ]
+    weight_on, weight_off = weight_on * on_curve[0] + 1e-9, weight_off * on_curve[1] + 1e-9
+    single = (weight_on * x_on / gap + weight_off * (1.0 - x_off / gap)) / (weight_on + weight_off)
+    chord = x_on / np.maximum(x_on + x_off, 1e-9)
+    at = np.where(on_curve[0] & on_curve[1], chord, single)
+    return replace(points, at=np.clip(at, 0.0, 1.0))
+
+
+def _fit_curve(points: EdgePoints, gap: Array, beam_width_mm: float) -> Array:
+    """Return the weights (2,), mm, of a Gaussian's and a disc's inverse S-curves, from pairs that both lie on the curve.
+
+    The distance between the two readings is known; the curve must bridge it. No beam is quite either, most lie between.
+    """
+    low, high = CURVE_LIMITS
+    f = points.window
+    on_curve = (f > low) & (f < high)
+    # Only what hangs together with the crossing: another edge may be near.
+    for j in (2, 1, 0):
+        on_curve[:, j] &= on_curve[:, j + 1] | (j == 2)
+        on_curve[:, 7 - j] &= on_curve[:, 6 - j] | (j == 2)
+    count = on_curve.sum(axis=1, keepdims=True)
+    place = np.arange(8)[None, :] * gap[:, None]
+    mean = lambda v: np.where(on_curve, v, 0.0).sum(axis=1, keepdims=True) / np.maximum(count, 1)  # noqa: E731
+    q = _inverse(np.clip(f, low, high))
+    rows = [(v - mean(v))[on_curve & (count > 1)] for v in q]
+    target = -(place - mean(place))[on_curve & (count > 1)]
+    guess = np.array([beam_width_mm / 5.0, beam_width_mm / 5.0])
+    weak = np.sqrt(0.5) * np.eye(2)
+    return nnls(np.vstack([np.stack(rows, axis=1), weak]), np.r_[target, weak @ guess])[0]
+
+
+def _windows(share: Array, line: PoseLine, pose: NDArray, law: NDArray) -> Array:
+    """Return shares (k, 8) along the line of each crossing, the crossing between the fourth and the fifth."""
+    step_pose, step_law = pose[:, 1] - pose[:, 0], law[:, 1] - law[:, 0]
+    reach = np.arange(-3, 5)
+    p = pose[:, :1] + reach * step_pose[:, None]
+    k = law[:, :1] + reach * step_law[:, None]
+    inside = (p >= 0) & (p < share.shape[0]) & (k >= 0) & (k < share.shape[1])
+    p, k = np.clip(p, 0, share.shape[0] - 1), np.clip(k, 0, share.shape[1] - 1)
+    inside &= (line.pass_id[p] == line.pass_id[pose[:, :1]]) & line.present[p]
+    return np.where(inside, share[p, k], np.nan)
+
+
+_DISC_X = np.linspace(-1.0, 1.0, 401)
+_DISC_SHARE = 0.5 + (np.arcsin(_DISC_X) + _DISC_X * np.sqrt(1.0 - _DISC_X**2)) / np.pi
+
+
+def _inverse(share: Array) -> Array:
+    """Return how far inside the edge a beam with this share on the part is (2, k): in Gaussian sigmas, in disc radii."""
+    return np.stack([ndtri(share), np.interp(share, _DISC_SHARE, _DISC_X)])
+
+
+def _none() -> EdgePoints:
+    z3, z = np.zeros((0, 3)), np.zeros(0)
+    no, none = np.zeros(0, dtype=bool), np.zeros(0, dtype=np.int32)
+    return EdgePoints(z3, z3.copy(), z, z.copy(), np.zeros((0, 8)), z.copy(), z3.copy(), no, none, z.copy(), z.copy())

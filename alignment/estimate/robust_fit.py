@@ -1,0 +1,88 @@
+"""The robust fit before the careful one: which patches and crossings belong to the part."""
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from alignment.estimate.patches import Patches
+from alignment.estimate.problem import Problem
+from alignment.estimate.robust import mad_sigma, tukey_weights
+from alignment.estimate.surface_rows import patch_rows
+from alignment.estimate.system import NUISANCES, EdgeData, nuisance_columns
+from planner.frames import Array, Transform
+
+STEPS = 40
+SURFACE_FLOOR_MM = 0.01
+EDGE_FLOOR_MM = 0.05
+# Beyond this many robust standard deviations a patch or a crossing belongs to something else.
+REJECT = 5.0
+EDGE_REJECT = 4.0
+LEAST_CROSSINGS = 12
+# A row is never taken to know more than this (mm): noise is shared between rows.
+SHARED_MM = 0.1
+SETTLED_MM = 1e-3
+
+
+@dataclass(frozen=True, eq=False)
+class RobustFit:
+    """Placement, patches used (p,), crossings used with their edges (None: too few), and whether the steps died out."""
+
+    T_base_part: Transform
+    used: NDArray[np.bool_]
+    edges: EdgeData | None
+    settled: bool
+
+
+def robust_fit(patches: Patches, problem: Problem, start: Transform, edges: EdgeData | None) -> RobustFit:
+    """Return the placement of a robust fit (Tukey's biweight, scales from the data) of patches and crossings together."""
+    T, settled = start, False
+    used = np.zeros(len(patches), dtype=bool)
+    base = np.minimum(patches.count, 50.0)
+    base = base / (1.0 + base)
+    k = 6 if edges is None else 6 + NUISANCES
+    nuisance = np.zeros(k - 6)
+    for i in range(STEPS):
+        rows = patch_rows(patches, problem.curved, T, problem.centre_mm(T))
+        if rows.valid.sum() < 6:
+            return RobustFit(T, rows.valid, None, False)
+        r, x = rows.r[rows.valid], rows.jacobian[rows.valid] * problem.prior_sigma
+        sigma = mad_sigma(r, SURFACE_FLOOR_MM, about_zero=True)
+        used = rows.valid.copy()
+        used[rows.valid] = np.abs(r) < REJECT * sigma
+        w = base[rows.valid] * tukey_weights(r, sigma) / (SHARED_MM + sigma) ** 2
+        normal, pull = np.eye(k), -np.r_[problem.total(T), nuisance]
+        normal[:6, :6] += (x * w[:, None]).T @ x
+        pull[:6] -= (x * w[:, None]).T @ r
+        if edges is not None:
+            edges = _add_edges(edges, problem, T, nuisance, normal, pull, first=i < 3)
+        z = np.linalg.solve(normal, pull)
+        T = problem.step(T, z[:6])
+        nuisance = nuisance + z[6:]
+        if problem.moves_mm(z[:6]) < SETTLED_MM and i >= 3:
+            settled = True
+            break
+    if edges is not None and edges.used.sum() < LEAST_CROSSINGS:
+        return robust_fit(patches, problem, start, None)
+    return RobustFit(T, used, edges, settled)
+
+
+def _add_edges(
+    edges: EdgeData, problem: Problem, T: Transform, nuisance: Array, normal: Array, pull: Array, first: bool
+) -> EdgeData:
+    """Add the crossings to the normal equations in place; return the edges with the crossings that belong."""
+    found = edges.rows(problem, T)
+    columns = nuisance_columns(edges, found)
+    r = found.r + columns @ nuisance
+    valid = found.valid
+    if valid.sum() < LEAST_CROSSINGS:
+        return replace(edges, used=valid & False)
+    sigma = mad_sigma(r[valid], EDGE_FLOOR_MM, about_zero=True)
+    if first:
+        sigma = max(sigma, 3.0)
+    used = valid & (np.abs(r) < EDGE_REJECT * sigma)
+    x = np.hstack([found.jacobian * problem.prior_sigma, columns])[used]
+    w = tukey_weights(r[used], sigma) / (SHARED_MM + sigma) ** 2
+    normal += (x * w[:, None]).T @ x
+    pull -= (x * w[:, None]).T @ r[used]
+    return replace(edges, used=used)

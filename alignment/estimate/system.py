@@ -1,0 +1,132 @@
+"""Everything measured, as one linear problem about a placement: patches of the surface, crossings of its edges."""
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from alignment.estimate.edge_points import EdgePoints
+from alignment.estimate.edge_rows import EdgeMap, EdgeRows, edge_rows
+from alignment.estimate.noise_rows import NoiseRows, noise_rows
+from alignment.estimate.patches import Patches
+from alignment.estimate.problem import Problem
+from alignment.estimate.surface_rows import Rows, patch_rows
+from planner.frames import Array, Transform
+
+# Crossings of one stretch of this length, one way of crossing and one side are one row (mm).
+EDGE_CELL_MM = 8.0
+MOST_EDGE_ROWS = 90
+# What the beam's asymmetry and the detection may shift every crossing by, as a share of the beam width, and what a late
+# clock may shift it by along the travel (mm). Both are estimated along; opposite edges and passes tell them apart.
+BIAS_SHARE = 0.1
+LAG_SIGMA_MM = 0.2
+# What an imperfect S-curve may shift a crossing by, as a share of the gap between its readings, by where it lies in the gap.
+PHASE_SHARE = 0.02
+NUISANCES = 3
+
+
+@dataclass(frozen=True, eq=False)
+class EdgeData:
+    """The crossings of a scan, the CAD edges, and which crossings belong to them (k,)."""
+
+    points: EdgePoints
+    map: EdgeMap
+    used: NDArray[np.bool_]
+    bias_sigma_mm: float
+
+    def rows(self, problem: Problem, T_base_part: Transform) -> EdgeRows:
+        """Return the residuals of all crossings."""
+        return edge_rows(self.points, self.map, problem.curved, T_base_part, problem.centre_mm(T_base_part))
+
+
+@dataclass(frozen=True, eq=False)
+class System:
+    """Patches used (p,) and, perhaps, crossings of edges. Unknowns: six of the motion, then edge bias, lag and phase."""
+
+    problem: Problem
+    patches: Patches
+    used: NDArray[np.bool_]
+    edges: EdgeData | None = None
+
+    @property
+    def unknowns(self) -> int:
+        """6, or 9 with edges."""
+        return 6 if self.edges is None else 6 + NUISANCES
+
+    def surface(self, T_base_part: Transform) -> Rows:
+        """Return the residuals of all patches."""
+        p = self.problem
+        return patch_rows(self.patches, p.curved, T_base_part, p.centre_mm(T_base_part))
+
+    def rows(self, T_base_part: Transform, nuisance: Array) -> NoiseRows:
+        """Return the condensed rows at a placement, with the edges' nuisances as they stand (3,), in their sigmas."""
+        p = self.problem
+        swath = p.setup.probe.swath_mm
+        surface = noise_rows(self.patches, self.surface(T_base_part), self.used, p.prior_sigma, swath)
+        if self.edges is None:
+            return surface
+        found = self.edges.rows(p, T_base_part)
+        return _joined(surface, self.edges, found, p.prior_sigma, nuisance)
+
+
+def nuisance_columns(edges: EdgeData, found: EdgeRows) -> Array:
+    """Return how the residuals of crossings change with edge bias, lag and phase (k, 3), per sigma of theirs."""
+    gap = edges.points.gap_mm
+    # Where the edge is, not where it was found: noise in the latter would explain itself.
+    place = edges.points.at + found.r / np.maximum(gap * found.cosine, 1e-3)
+    phase = np.sin(2.0 * np.pi * np.clip(place, 0.0, 1.0)) * gap
+    return np.column_stack(
+        [np.full(len(found.r), -edges.bias_sigma_mm), -LAG_SIGMA_MM * found.lag, PHASE_SHARE * phase]
+    )
+
+
+def _joined(surface: NoiseRows, edges: EdgeData, found: EdgeRows, prior_sigma: Array, nuisance: Array) -> NoiseRows:
+    picked = np.flatnonzero(edges.used)
+    points, cell = edges.points, EDGE_CELL_MM
+    while True:
+        stretch = np.floor(points.s_mm[picked] / cell).astype(np.int64)
+        band = np.where(points.along[picked], np.floor(points.law[picked] / 12.0), 0).astype(np.int64)
+        leaving = (found.lag[picked] > 0).astype(np.int64)
+        side = np.where(np.abs(found.lag[picked]) > 0.3, leaving, 2 + _side(found, picked))
+        key = np.column_stack([points.pass_id[picked], stretch, points.along[picked], band, side])
+        _, at = np.unique(key, axis=0, return_inverse=True)
+        n = 1 + int(at.max(initial=-1))
+        if n <= MOST_EDGE_ROWS:
+            break
+        cell *= 1.3
+    count = np.bincount(at, minlength=n).astype(np.float64)
+
+    def mean(values: Array) -> Array:
+        columns = values.reshape(len(picked), -1)
+        return np.stack([np.bincount(at, c, n) / count for c in columns.T], axis=1)
+
+    columns = nuisance_columns(edges, found)[picked]
+    x = np.hstack([mean(found.jacobian[picked] * prior_sigma), mean(columns)])
+    r = mean(found.r[picked] + columns @ nuisance)[:, 0]
+    s = mean(points.s_mm[picked])[:, 0]
+    pass_id = np.zeros(n, dtype=np.int32)
+    pass_id[at] = points.pass_id[picked]
+    blocks = len(surface.block_from_mm)
+    wide = np.zeros((len(surface), NUISANCES))
+    return replace(
+        surface,
+        r=np.r_[surface.r, r],
+        x=np.vstack([np.hstack([surface.x, wide]), x]),
+        count=np.r_[surface.count, count],
+        block=np.r_[surface.block, blocks + np.arange(n, dtype=np.int32)].astype(np.int32),
+        across=np.r_[surface.across, np.zeros(n)],
+        position_base=np.vstack([surface.position_base, mean(found.point_base[picked])]),
+        block_from_mm=np.r_[surface.block_from_mm, s],
+        block_to_mm=np.r_[surface.block_to_mm, s],
+        block_pass=np.r_[surface.block_pass, pass_id].astype(np.int32),
+        edge=np.r_[surface.edge, np.ones(n, dtype=bool)],
+    )
+
+
+def _side(found: EdgeRows, picked: NDArray[np.intp]) -> NDArray[np.int64]:
+    """Return 0 or 1 for edges on either side of the travel, by the direction of their conormal."""
+    b = found.jacobian[picked, 3:]
+    if len(b) == 0:
+        return np.zeros(0, dtype=np.int64)
+    axis = np.linalg.svd(b.T @ b)[0][:, 0]
+    return (b @ axis > 0).astype(np.int64)
