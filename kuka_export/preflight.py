@@ -81,7 +81,14 @@ def check_path(path: ToolPath) -> list[Issue]:
     bad = np.flatnonzero(~(np.isfinite(path.Ts_part_contact.matrix).all(axis=(1, 2)) & np.isfinite(path.standoff_mm)))
     if len(bad):
         place = f"pass {int(path.pass_id[bad[0]]) + 1} pose {int(bad[0])}"
-        return [_error("krl-not-finite", f"{len(bad)} poses are not numbers.", "Plan the path again; the surface is damaged there.", place)]
+        return [
+            _error(
+                "krl-not-finite",
+                f"{len(bad)} poses are not numbers.",
+                "Plan the path again; the surface is damaged there.",
+                place,
+            )
+        ]
     return []
 
 

@@ -1,14 +1,14 @@
 """The proof of a program: its text, read back, says what was meant."""
 
 import hashlib
-from collections.abc import Iterable, Iterator
 from dataclasses import dataclass, field
 
 import numpy as np
 
+from kuka_export.expected import AxisRow, expected
 from kuka_export.language.library import Library, load
 from kuka_export.numbers import DEG_ROUNDING, MM_ROUNDING
-from kuka_export.program import Fold, KrlProgram, Moves, Setting, SplineBlock, Statement, WaitInput
+from kuka_export.program import KrlProgram
 from kuka_export.reader import KrlReading, read_library
 from planner.errors import EchoBaseError
 from planner.frames import Array
@@ -51,13 +51,19 @@ def prove(program: KrlProgram, files: dict[str, bytes], library: Library | None 
     """
     sha = {name: hashlib.sha256(data).hexdigest() for name, data in files.items()}
     size = sum(len(data) for data in files.values())
+    library = load(files) if library is None else library
     try:
-        reading = read_library(load(files) if library is None else library, program.data_output)
+        reading = read_library(library, program.data_output)
     except EchoBaseError as error:
         return Proof(0, 0, len(program.modules), size, np.inf, np.inf, sha, error.issues)
     faults, mm, deg = _compare(program, reading)
     faults += [i.message for i in reading.issues]
     faults += _surface(program, files)
+    faults += [
+        f"{source.name} does not hold the routine of its name"
+        for source in library.files.values()
+        if [r.name for r in source.routines] != [source.name.rsplit(".", 1)[0]]
+    ]
     issues = tuple(_fault(text) for text in faults)
     passes = len(np.unique(reading.path.pass_id))
     return Proof(len(reading.path), passes, len(program.modules), size, mm, deg, sha, issues)
@@ -74,11 +80,11 @@ def _compare(program: KrlProgram, reading: KrlReading) -> tuple[list[str], float
         faults.append(
             f"{len(off)} poses differ by up to {mm.max():.4f} mm and {deg.max():.5f} deg, the first at {reading.module[off[0]]}:{reading.line[off[0]]}"
         )
-    words, blends = _written_words(program)
+    meant = expected(program)
     path = reading.path
     rows = (
-        ("the motion words", words == reading.words),
-        ("the blending", blends == reading.approximation),
+        ("the motion words", meant.words == reading.words),
+        ("the blending", meant.blends == reading.approximation),
         ("the spline blocks", np.array_equal(path.block, program.block)),
         ("the kinds of motion", np.array_equal(path.motion == Motion.SPL, program.block >= 0)),
         ("the data signal", np.array_equal(path.data_on, program.data_on) and reading.exact_switching),
@@ -88,11 +94,16 @@ def _compare(program: KrlProgram, reading: KrlReading) -> tuple[list[str], float
         ("the speeds", np.allclose(path.speed_mm_s, program.speed_mm_s, rtol=0.0, atol=0.0051)),
         ("the base number", reading.base_number == program.base_number and reading.base_frame is None),
         ("the tool number", reading.tool_number == program.tool_number),
-        ("the settings", _settings_agree(program, reading)),
-        ("the waits", len(reading.waits) == _count(program, WaitInput)),
+        ("the settings", meant.settings == reading.settings),
+        ("the waits", meant.waits == reading.waits),
         ("the main modules", reading.mains == tuple(load.main for load in program.loads)),
         ("the calls", list(reading.calls) == [(load.main, m) for load in program.loads for m in load.modules]),
-        ("the home motions", reading.starts_at_home or program.base_frame is not None),
+        (
+            "the home motions",
+            meant.homes == reading.homes and (reading.starts_at_home or program.base_frame is not None),
+        ),
+        ("the initialisation", reading.basis == ("INITMOV,0",) * len(program.loads)),
+        ("the places where the base is set", len(reading.base_writes) == meant.base_writes),
     )
     faults += [f"{what} differ from what was meant" for what, same in rows if not same]
     pairs: list[tuple[str, Array | None, object]] = [
@@ -104,12 +115,8 @@ def _compare(program: KrlProgram, reading: KrlReading) -> tuple[list[str], float
         faults.append("a base is written that was not meant to be")
     if any(before for _, _, before in reading.base_writes[:1]):
         faults.append("the base is written after the first motion")
-    meant_axes = [a for a in program.first_axes_deg if a is not None]
-    got_axes = reading.first_axes_all
-    if len(meant_axes) != len(got_axes) or any(
-        np.abs(np.asarray(a) - np.array(b)).max() > DEG_ALLOWED for a, b in zip(meant_axes, got_axes, strict=True)
-    ):
-        faults.append("the first axis values differ")
+    if not _same_axes(meant.axis_moves, reading.axis_moves):
+        faults.append("the axis motions differ")
     return faults, largest_mm, largest_deg
 
 
@@ -126,54 +133,19 @@ def _same_frame(meant: Array | None, got: object) -> bool:
     return bool((mm <= MM_ALLOWED).all() and (deg <= DEG_ALLOWED).all())
 
 
-def _walk(body: Iterable[Statement]) -> Iterator[Statement]:
-    for s in body:
-        yield s
-        if isinstance(s, Fold | SplineBlock):
-            yield from _walk(s.body)
-
-
-def _in_order(program: KrlProgram) -> Iterator[Statement]:
-    for load in program.loads:
-        for name in (load.main, *load.modules):
-            yield from _walk(program.module(name).body)
-
-
-def _written_words(program: KrlProgram) -> tuple[tuple[str, ...], tuple[str, ...]]:
-    words: list[str] = []
-    blends: list[str] = []
-    for s in _in_order(program):
-        if isinstance(s, Moves):
-            words += [s.word] * len(s.poses)
-            blends += [s.blend] * len(s.poses)
-    return tuple(words), tuple(blends)
-
-
-def _count(program: KrlProgram, kind: type) -> int:
-    return sum(isinstance(s, kind) for s in _in_order(program))
-
-
-def _settings_agree(program: KrlProgram, reading: KrlReading) -> bool:
-    meant = {
-        s.variable: s.value
-        for s in _in_order(program)
-        if isinstance(s, Setting) and s.variable != "$VEL.CP" and "[" not in s.variable
-    }
-    if set(meant) != set(reading.settings):
+def _same_axes(meant: tuple[AxisRow, ...], got: tuple[AxisRow, ...]) -> bool:
+    if [(row, word) for row, word, _ in meant] != [(row, word) for row, word, _ in got]:
         return False
-    for name, text in meant.items():
-        got = reading.settings[name]
-        same = got == text if isinstance(got, str) else isinstance(got, int | float) and got == float(text)
-        if not same:
-            return False
-    return True
+    return all(
+        np.abs(np.array(a) - np.array(b)).max() <= DEG_ALLOWED for (_, _, a), (_, _, b) in zip(meant, got, strict=True)
+    )
 
 
 def _surface(program: KrlProgram, files: dict[str, bytes]) -> list[str]:
     """Bytes no reader of meaning would see: character set, line ends, the set of files."""
     faults: list[str] = []
-    expected = {f"{m.name}.src" for m in program.modules} | {f"{m.name}.dat" for m in program.modules if m.data}
-    if set(files) != expected:
+    names = {f"{m.name}.src" for m in program.modules} | {f"{m.name}.dat" for m in program.modules if m.data}
+    if set(files) != names:
         faults.append("the set of files differs from the program's modules")
     for name, data in files.items():
         if not data.isascii() or any(b < 32 and b not in (10, 13) for b in set(data)):

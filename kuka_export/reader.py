@@ -22,8 +22,9 @@ class KrlReading:
     None. first_axes (6,): axis values of the first axis motion, or None; `first_axes_all`, of every main module. `main`,
     `mains`: modules a person selects; `modules`: all files' first routines; `calls`: (caller, called) in order.
     data_output: the $OUT that is taken as the data signal; `data_source`: trigger, pulse, assignment, comment or none.
-    words, module, line: of every motion, as the file has them. settings: system variables as last set (a number, or the
-    name of a variable whose value the files do not say). `issues`: what could not be followed, as warnings.
+    words, module, line: of every motion, as the file has them. settings: (motions before it, system variable, value) of
+    every assignment in order; a value the files do not say is the name it was taken from. waits: (motions before it, input).
+    `issues`: what could not be followed, as warnings.
     """
 
     path: ProgramPath
@@ -44,13 +45,15 @@ class KrlReading:
     exact_switching: bool
     homes: int
     starts_at_home: bool
-    waits: tuple[int, ...]
+    waits: tuple[tuple[int, int | None], ...]
+    axis_moves: tuple[tuple[int, str, tuple[float, ...]], ...]
+    basis: tuple[str, ...]
     base_writes: tuple[tuple[int, str, int], ...]
     words: tuple[str, ...]
     approximation: tuple[str, ...]
     module: tuple[str, ...]
     line: NDArray[np.int64]
-    settings: dict[str, object]
+    settings: tuple[tuple[int, str, object], ...]
     issues: tuple[Issue, ...] = ()
 
     @property
@@ -147,9 +150,9 @@ def _reading(
         base_frame=base.frame, first_axes=np.array(axes[0]) if axes else None,
         first_axes_all=tuple(axes[i] for i in first_rows if i < len(axes)), main=mains[0], mains=tuple(mains),
         modules=tuple(s.routines[0].name for s in library.sources() if s.routines), calls=tuple(out.calls), data_output=chosen,
-        data_source=how, exact_switching=exact, homes=len(out.homes), starts_at_home=home_first, waits=tuple(out.waits),
+        data_source=how, exact_switching=exact, homes=len(out.homes), starts_at_home=home_first, waits=tuple(out.waits), axis_moves=tuple(out.axis_moves), basis=tuple(out.basis),
         base_writes=tuple(out.base_writes), words=tuple(out.words), approximation=tuple(out.approximation),
-        module=tuple(out.module), line=np.array(out.lines), settings=dict(out.settings), issues=(*out.notes, *notes),
+        module=tuple(out.module), line=np.array(out.lines), settings=tuple(out.settings), issues=(*out.notes, *notes),
     )  # fmt: skip
 
 

@@ -27,7 +27,16 @@ from kuka_export.language.nodes import (
     Trigger,
     Wait,
 )  # fmt: skip
-from kuka_export.language.values import UnknownValueError, Value, compose, evaluate, frame_of, key_of, number
+from kuka_export.language.values import (
+    UnknownValueError,
+    Value,
+    compose,
+    evaluate,
+    frame_of,
+    key_of,
+    number,
+    only_components,
+)
 from kuka_export.language.vocabulary import AXIS_NAMES, CARTESIAN, MOTION_CIRCLE, MOTION_RELATIVE
 from planner.errors import EchoBaseError, fail
 from planner.issues import Issue
@@ -122,7 +131,7 @@ class Follower:
         elif isinstance(s, Pulse):
             self._switch(s.output, None, False, True, s.line)
         elif isinstance(s, Wait):
-            self.out.waits.append(len(self.out.poses))
+            self.out.waits.append((len(self.out.poses), _input(s)))
         elif isinstance(s, Control) and s.word not in _IGNORED:
             raise self._stop(
                 s.line,
@@ -150,9 +159,13 @@ class Follower:
         elif name == "$TOOL":
             self.tool = self._tool_number(s)
         elif name == "$VEL.CP":
-            self.speed_mm_s = 1000.0 * number(evaluate(s.value, self.known))
+            speed = number(evaluate(s.value, self.known))
+            self.speed_mm_s = 1000.0 * speed
+            self.out.settings.append((len(self.out.poses), name, speed))
         elif name == "$OUT" and target.index:
-            self._switch(target.index[0], bool(evaluate(s.value, self.known)), False, True, s.line)
+            value = bool(evaluate(s.value, self.known))
+            self._switch(target.index[0], value, False, True, s.line)
+            self.out.settings.append((len(self.out.poses), key_of(target, self.known), value))
         elif name == "BASE_DATA" and target.index:
             n = int(number(evaluate(target.index[0], self.known)))
             self.out.base_data[n] = frame_of(evaluate(s.value, self.known))
@@ -171,10 +184,10 @@ class Follower:
         except UnknownValueError as error:
             self.known.pop(key, None)
             if system:
-                self.out.settings[system] = error.name
+                self.out.settings.append((len(self.out.poses), system, error.name))
             return
         if system:
-            self.out.settings[system] = value
+            self.out.settings.append((len(self.out.poses), system, value))
         if len(s.target.names) == 1:
             self.known[key] = value
             return
@@ -271,8 +284,10 @@ class Follower:
         if not isinstance(value, dict):
             raise KrlSyntaxError("krl-type", "A motion needs a point.")
         if set(value) & set(AXIS_NAMES[:6]):
+            only_components(value, "E6AXIS")
             self._axes(s, value)
             return None
+        only_components(value, "E6POS")
         return self._filled(value)
 
     def _to_pose(self, s: Move, pose: tuple[float, ...], routine: Routine) -> None:
@@ -345,3 +360,19 @@ def _at_start(t: Trigger) -> bool:
     if t.measure == "PATH":
         return t.on_start
     return isinstance(t.amount, Number) and t.amount.value == 0.0
+
+
+def _input(s: Wait) -> int | None:
+    """Return n of `WAIT FOR $IN[n]` and `WAIT FOR $IN[n]==TRUE`, None for any other wait."""
+    e = s.value
+    if isinstance(e, Chain) and e.operators == ("==",) and e.operands[1] == Designator(("TRUE",), (None,)):
+        e = e.operands[0]
+    if (
+        s.what == "FOR"
+        and isinstance(e, Designator)
+        and e.dotted == "$IN"
+        and e.index
+        and isinstance(e.index[0], Number)
+    ):
+        return int(e.index[0].value)
+    return None

@@ -6,6 +6,7 @@ from typing import TYPE_CHECKING
 
 from kuka_export.language.followed import BaseState
 from kuka_export.language.nodes import Assign, CallExpression, CallStatement, Enumeration, Expression
+from kuka_export.language.parse import constant
 from kuka_export.language.values import UnknownValueError, evaluate, number
 
 if TYPE_CHECKING:
@@ -19,6 +20,8 @@ def basis_call(f: Follower, s: CallStatement) -> None:
     """Follow BAS(#COMMAND, value): INITMOV, BASE, TOOL, FRAMES, VEL_CP and CP_PARAMS change what is followed."""
     command = s.arguments[0].name if s.arguments and isinstance(s.arguments[0], Enumeration) else ""
     value = s.arguments[1] if len(s.arguments) > 1 else None
+    given = constant(value)
+    f.out.basis.append(command if given is None else f"{command},{given:g}")
     if command == "INITMOV":
         f.base, f.tool, f.speed_mm_s = BaseState(0), 1, INITIAL_SPEED_MM_S
     elif command == "BASE" and value is not None:

@@ -16,7 +16,7 @@ from kuka_export.language.nodes import (
     Text,
     Unary,
 )  # fmt: skip
-from kuka_export.language.vocabulary import CARTESIAN
+from kuka_export.language.vocabulary import CARTESIAN, COMPONENTS
 from planner.frames import Transform
 
 Value = Any
@@ -40,7 +40,10 @@ def evaluate(e: Expression, known: Mapping[str, Value]) -> Value:
     if isinstance(e, Enumeration):
         return "#" + e.name
     if isinstance(e, Aggregate):
-        return {name: evaluate(v, known) for name, v in e.components}
+        parts = {name: evaluate(v, known) for name, v in e.components}
+        if len(parts) < len(e.components):
+            raise KrlSyntaxError("krl-component-twice", "A component is given twice.")
+        return parts
     if isinstance(e, Designator):
         return _named(e, known)
     if isinstance(e, Unary):
@@ -72,7 +75,15 @@ def frame_of(value: Value) -> tuple[float, ...]:
     """Return X Y Z A B C of an aggregate; what is missing is 0. Raises KrlSyntaxError if it is no frame."""
     if not isinstance(value, dict) or not set(value) & set(CARTESIAN):
         raise KrlSyntaxError("krl-type", "A frame {X, Y, Z, A, B, C} is needed here.")
+    only_components(value, "E6POS")
     return tuple(number(value.get(k, 0.0)) for k in CARTESIAN)
+
+
+def only_components(value: dict[str, Value], kind: str) -> None:
+    """Raise KrlSyntaxError if an aggregate has a component that a `kind` (E6POS, E6AXIS) does not know."""
+    strange = set(value) - COMPONENTS[kind]
+    if strange:
+        raise KrlSyntaxError("krl-component", f"{min(strange)} is no component of a {kind}.")
 
 
 def compose(first: tuple[float, ...], second: tuple[float, ...]) -> tuple[float, ...]:

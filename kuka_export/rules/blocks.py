@@ -151,7 +151,8 @@ def _trigger(s: Trigger) -> Iterator[Finding]:
 def check_families(routine: Routine, controller: str | None) -> Iterator[Finding]:
     """Yield mixed motion families, approximations of the other family, and words the controller does not have."""
     first: Move | None = None
-    classic = spline = None
+    classic: Move | None = None
+    spline: Move | SplineOpen | None = None
     for s in routine.body:
         if isinstance(s, SplineOpen):
             spline = spline or s

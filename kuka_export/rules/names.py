@@ -56,7 +56,10 @@ def check_modules(library: Library, files: Mapping[str, bytes]) -> Iterator[tupl
     for path, source in library.files.items():
         key = source.name.upper()
         if key in seen and files[path] != files[seen[key]]:
-            yield source.name, Finding(1, "krl-module-twice", f"{path} and {seen[key]} are one module to the controller, and differ")
+            yield (
+                source.name,
+                Finding(1, "krl-module-twice", f"{path} and {seen[key]} are one module to the controller, and differ"),
+            )
         seen.setdefault(key, path)
 
 
