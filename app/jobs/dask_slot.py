@@ -53,6 +53,9 @@ class DaskSlot:
         self._future.add_done_callback(lambda done: _settle(done, answer))
         return answer
 
+    def warm(self) -> None:
+        """The cluster keeps itself warm."""
+
     def _hear(self, event: tuple[Any, Any]) -> None:
         message = event[1]
         self._report = Report(float(message["fraction"]), str(message["text"]))

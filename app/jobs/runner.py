@@ -19,6 +19,7 @@ from planner.issues import Issue
 
 log = logging.getLogger(__name__)
 TICK_S = 0.1
+IDLE_S = 2.0
 
 
 @dataclass
@@ -36,6 +37,7 @@ class JobRunner:
         self._wake = threading.Condition()
         self._running: dict[str, _Running] = {}
         self._stopping = False
+        self._submitted = 0
         self._threads: list[threading.Thread] = []
 
     def start(self) -> None:
@@ -62,7 +64,8 @@ class JobRunner:
         if added:
             self._tell(row)
             with self._wake:
-                self._wake.notify()
+                self._submitted += 1
+                self._wake.notify_all()
         return row
 
     def cancel(self, job_id: str) -> JobRow:
@@ -112,7 +115,7 @@ class JobRunner:
     def _serve(self) -> None:
         slot = self._make_slot()
         try:
-            while (row := self._take()) is not None:
+            while (row := self._take(slot)) is not None:
                 try:
                     self._do(slot, row)
                 except Exception:
@@ -124,12 +127,13 @@ class JobRunner:
         finally:
             slot.close()
 
-    def _take(self) -> JobRow | None:
+    def _take(self, slot: Slot) -> JobRow | None:
         """Wait for a queued job; None when the server stops."""
         while True:
             with self._wake:
                 if self._stopping:
                     return None
+                seen = self._submitted
             self.store.hold()
             with self.store.db.write() as session:
                 row = jobs.take_next(session)
@@ -140,8 +144,10 @@ class JobRunner:
                 return row
             self.store.release()
             with self._wake:
-                if not self._stopping:
-                    self._wake.wait(timeout=5.0)
+                # What was submitted since the look at the table has already called.
+                woken = self._stopping or self._submitted != seen or self._wake.wait(timeout=IDLE_S)
+            if not woken:
+                slot.warm()
 
     def _do(self, slot: Slot, row: JobRow) -> None:
         settings = self.store.settings

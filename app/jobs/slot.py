@@ -27,6 +27,9 @@ class Slot(Protocol):
     def submit(self, payload: Payload) -> "Future[Outcome]":
         """Start the work."""
 
+    def warm(self) -> None:
+        """Get ready while nobody waits."""
+
     def report(self) -> Report:
         """Return how far it is."""
 
@@ -47,13 +50,21 @@ class ProcessSlot:
         self._folder = Path(tempfile.mkdtemp(prefix="echobase-slot-"))
         self._pool: ProcessPoolExecutor | None = None
 
+    def warm(self) -> None:
+        """Have the process ready: it imports for some seconds, better now than when somebody waits for it."""
+        if self._pool is None:
+            self._ready().submit(os.getpid)
+
+    def _ready(self) -> ProcessPoolExecutor:
+        if self._pool is None:
+            self._pool = ProcessPoolExecutor(1, CONTEXT, _begin)
+        return self._pool
+
     def submit(self, payload: Payload) -> "Future[Outcome]":
         """Start the work in the process; a new one if the last was ended."""
         for name in ("report", "stop"):
             (self._folder / name).unlink(missing_ok=True)
-        if self._pool is None:
-            self._pool = ProcessPoolExecutor(1, CONTEXT, _begin)
-        return self._pool.submit(_run, payload, str(self._folder))
+        return self._ready().submit(_run, payload, str(self._folder))
 
     def report(self) -> Report:
         """Return the last report."""

@@ -97,6 +97,8 @@ def _check_names(manifest: Manifest, members: dict[str, zipfile.ZipInfo]) -> Non
 def _keep(store: Store, archive: zipfile.ZipFile, entry: FilePart) -> Blob:
     with store.writer(entry.size, "archive entry") as writer, archive.open(entry.member) as file:
         while data := file.read(CHUNK):
+            if writer.size + len(data) > entry.size:
+                break
             writer.write(data)
         blob = writer.finish()
     if blob.sha256 != entry.sha256 or blob.size != entry.size:

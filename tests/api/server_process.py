@@ -1,5 +1,6 @@
 """A real server in a process of its own, and small clients for it."""
 
+import atexit
 import json
 import os
 import signal
@@ -21,24 +22,59 @@ def free_port() -> int:
         return probe.getsockname()[1]
 
 
+class Nursery:
+    """The process that forks servers; one for all tests."""
+
+    _one: "Nursery | None" = None
+
+    def __init__(self) -> None:
+        env = {**os.environ, "PYTHONPATH": str(ROOT)}
+        command = [sys.executable, "-W", "ignore", "-m", "tests.api.nursery"]
+        pipe = subprocess.PIPE
+        self._process = subprocess.Popen(command, cwd=ROOT, env=env, stdin=pipe, stdout=pipe, stderr=None)
+        atexit.register(self.close)
+
+    @classmethod
+    def get(cls) -> "Nursery":
+        cls._one = cls._one or cls()
+        return cls._one
+
+    def ask(self, **order: object) -> dict[str, int]:
+        assert self._process.stdin is not None
+        self._process.stdin.write(json.dumps(order).encode() + b"\n")
+        self._process.stdin.flush()
+        return json.loads(self.line(b"{"))
+
+    def line(self, wanted: bytes) -> bytes:
+        """Return the next line with `wanted` in it; the servers write their addresses here too."""
+        assert self._process.stdout is not None
+        while line := self._process.stdout.readline():
+            if wanted in line:
+                return line
+        raise AssertionError("the nursery ended")
+
+    def close(self) -> None:
+        assert self._process.stdin is not None
+        assert self._process.stdout is not None
+        self._process.stdin.close()
+        self._process.wait(timeout=30)
+        self._process.stdout.close()
+
+
 class ServerProcess:
     """Starts, kills and restarts a server on one data folder."""
 
     def __init__(self, data: Path, workflow: str = "tests.api.fake_workflow", **settings: object) -> None:
         self.data, self.port = data, free_port()
         self.url = f"http://127.0.0.1:{self.port}"
-        self.env = {**os.environ, "ECHOBASE_WORKFLOW": workflow, "PYTHONPATH": str(ROOT)}
-        self.env |= {f"ECHOBASE_{key.upper()}": str(value) for key, value in settings.items()}
-        self.process: subprocess.Popen[bytes] | None = None
+        self.env = {f"ECHOBASE_{key.upper()}": str(value) for key, value in {"workflow": workflow, **settings}.items()}
+        self.pid: int | None = None
 
     def start(self) -> "ServerProcess":
-        code = "import sys; from pathlib import Path; from app.server import serve; "
-        code += f"sys.exit(serve('127.0.0.1', {self.port}, Path({str(self.data)!r})))"
-        self.process = subprocess.Popen([sys.executable, "-c", code], cwd=ROOT, env=self.env, stdout=subprocess.PIPE)
-        assert self.process.stdout is not None
+        nursery = Nursery.get()
+        self.pid = nursery.ask(do="start", port=self.port, data=str(self.data), env=self.env)["pid"]
         # The socket listens before the address is printed: the first request waits until it is served.
-        line = self.process.stdout.readline().decode()
-        assert self.url in line, f"the server did not start: {line!r}"
+        nursery.line(self.url.encode())
         assert httpx.get(f"{self.url}/api/v1/health", timeout=60.0).status_code == 200
         return self
 
@@ -51,12 +87,10 @@ class ServerProcess:
         return self._end(signal.SIGTERM)
 
     def _end(self, how: signal.Signals) -> int:
-        assert self.process is not None
-        self.process.send_signal(how)
-        status = self.process.wait(timeout=30)
-        assert self.process.stdout is not None
-        self.process.stdout.close()
-        return status
+        pid, self.pid = self.pid, None
+        assert pid is not None
+        os.kill(pid, how)
+        return Nursery.get().ask(do="wait", pid=pid)["status"]
 
 
 @contextmanager
@@ -65,7 +99,7 @@ def running(data: Path, **settings: object):
     try:
         yield server
     finally:
-        if server.process is not None and server.process.poll() is None:
+        if server.pid is not None:
             server.stop()
 
 
