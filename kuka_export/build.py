@@ -18,7 +18,7 @@ from kuka_export.preflight import (
     data_centroid_base_mm,
     loads_issue,
     size_issue,
-)  # fmt: skip
+)
 from kuka_export.profiles import Profile, profile_of
 from kuka_export.program import KrlProgram, Load, Module
 from kuka_export.route import Route, data_switches, route, scan_speed_mm_s, shifted
@@ -32,9 +32,16 @@ from planner.toolpath import ToolPath
 
 
 def build_program(
-    path: ToolPath, setup: Setup, name: str, label: str = "", *, T_base_basecorr: Transform | None = None,
-    options: ProgramOptions = DEFAULT_OPTIONS, notes: Sequence[str] = (), centroid_base_mm: ArrayLike | None = None,
-) -> KrlProgram:  # fmt: skip
+    path: ToolPath,
+    setup: Setup,
+    name: str,
+    label: str = "",
+    *,
+    T_base_basecorr: Transform | None = None,
+    options: ProgramOptions = DEFAULT_OPTIONS,
+    notes: Sequence[str] = (),
+    centroid_base_mm: ArrayLike | None = None,
+) -> KrlProgram:
     """Return the program of a decimated path.
 
     `name`: stem of all module names, at most 16 characters of A-Z, 0-9, `_`. `T_base_basecorr`: the correction; motion
@@ -81,8 +88,25 @@ def build_program(
         a, b = group[0].start, group[-1].stop
         start = None if base.frame is None else _start(setup, r, a, b, T_base_basecorr, issues)
         load_main = main if len(groups) == 1 else f"{main}_L{k}"
-        modules.append(_main(load_main, group, base_name, base, setup, profile, options, r, (a, b), label, notes,
-                             blend_mm, style.data_output, start, f"LOAD {k} OF {len(groups)}" if len(groups) > 1 else ""))  # fmt: skip
+        modules.append(
+            _main(
+                load_main,
+                group,
+                base_name,
+                base,
+                setup,
+                profile,
+                options,
+                r,
+                (a, b),
+                label,
+                notes,
+                blend_mm,
+                style.data_output,
+                start,
+                f"LOAD {k} OF {len(groups)}" if len(groups) > 1 else "",
+            )
+        )
         loads.append(Load(load_main, (*([base_name] if base_name else []), *(p.module.name for p in group))))
         starts.append(start)
     if base_name is not None:
@@ -96,15 +120,34 @@ def build_program(
     _stop_on_errors(issues)
     on, off = data_switches(r)
     return KrlProgram(
-        name=main, stem=stem, kind=path.kind, profile=profile.name, label=label, modules=tuple(modules), loads=tuple(loads),
-        poses=r.poses, data_on=shifted(np.cumsum(on) - np.cumsum(off), 0) > 0,
-        pass_id=r.pass_id, block=block_numbers(r, style), speed_mm_s=r.speed_mm_s,
+        name=main,
+        stem=stem,
+        kind=path.kind,
+        profile=profile.name,
+        label=label,
+        modules=tuple(modules),
+        loads=tuple(loads),
+        poses=r.poses,
+        data_on=shifted(np.cumsum(on) - np.cumsum(off), 0) > 0,
+        pass_id=r.pass_id,
+        block=block_numbers(r, style),
+        speed_mm_s=r.speed_mm_s,
         first_axes_deg=tuple(None if s is None else s.axes_deg for s in starts),
-        base_number=base.number, tool_number=setup.tool.number, base_frame=base.frame, base_offset=base.offset,
-        data_output=style.data_output, signal=options.signal if style.data_output is not None else "none",
-        wait_input=style.wait_input, limits={"load_bytes": load_bytes, "load_modules": load_modules,
-        "module_lines": options.module_lines or profile.module_lines, "segments": style.segments}, issues=tuple(issues),
-    )  # fmt: skip
+        base_number=base.number,
+        tool_number=setup.tool.number,
+        base_frame=base.frame,
+        base_offset=base.offset,
+        data_output=style.data_output,
+        signal=options.signal if style.data_output is not None else "none",
+        wait_input=style.wait_input,
+        limits={
+            "load_bytes": load_bytes,
+            "load_modules": load_modules,
+            "module_lines": options.module_lines or profile.module_lines,
+            "segments": style.segments,
+        },
+        issues=tuple(issues),
+    )
 
 
 def _base_plan(setup: Setup, T_base_basecorr: Transform | None) -> BasePlan:
@@ -134,10 +177,22 @@ def _start(
 
 
 def _main(
-    name: str, group: list[Packed], base_name: str | None, base: BasePlan, setup: Setup, profile: Profile,
-    options: ProgramOptions, r: Route, rows: tuple[int, int], label: str, notes: Sequence[str], blend_mm: float,
-    data_output: int | None, start: Start | None, load: str,
-) -> Module:  # fmt: skip
+    name: str,
+    group: list[Packed],
+    base_name: str | None,
+    base: BasePlan,
+    setup: Setup,
+    profile: Profile,
+    options: ProgramOptions,
+    r: Route,
+    rows: tuple[int, int],
+    label: str,
+    notes: Sequence[str],
+    blend_mm: float,
+    data_output: int | None,
+    start: Start | None,
+    load: str,
+) -> Module:
     a, b = rows
     title = f"corrected {r.kind}" if base.correction is not None and r.kind != "corrected" else r.kind
     passes = len(np.unique(r.pass_id[a:b]))

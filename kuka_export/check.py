@@ -20,9 +20,9 @@ _GENERAL = PROFILES["krc4"]
 def check_files(files: dict[str, bytes], controller: str | None = None, library: Library | None = None) -> list[Issue]:
     """Return the findings for file name -> bytes (.src, .dat, .sub), in order of file and line.
 
-    `library`: the same files, parsed already. `controller`: krc2, krc4 or krc5 adds its limits and words; None: what any of them accepts. Errors are what no
-    controller runs, or what would move the robot elsewhere than it says; the rest are warnings. A name that none of the
-    files declares may be global on the controller: a warning.
+    `library`: the same files, parsed already. `controller`: krc2, krc4 or krc5 adds its limits and words; None: what any
+    of them accepts. Errors are what no controller runs, or what would move the robot elsewhere than it says; the rest are
+    warnings. A name that none of the files declares may be global on the controller: a warning.
     """
     library = load(files) if library is None else library
     if not library.files:

@@ -4,7 +4,17 @@ from collections.abc import Iterable, Iterator
 from dataclasses import dataclass
 
 from kuka_export.program import (
-    AxisMove, Call, DefineBase, Fold, HomeMove, KrlProgram, Moves, Setting, SplineBlock, Statement, WaitInput,
+    AxisMove,
+    Call,
+    DefineBase,
+    Fold,
+    HomeMove,
+    KrlProgram,
+    Moves,
+    Setting,
+    SplineBlock,
+    Statement,
+    WaitInput,
 )  # fmt: skip
 
 AxisRow = tuple[int, str, tuple[float, ...]]

@@ -34,10 +34,18 @@ class Export:
 
 
 def export(
-    path: ToolPath, setup: Setup, name: str, label: str = "", *, T_base_basecorr: Transform | None = None,
-    options: ProgramOptions = DEFAULT_OPTIONS, notes: Sequence[str] = (), centroid_base_mm: ArrayLike | None = None,
-    verdict: Verdict | None = None, acceptance: str = "",
-) -> Export:  # fmt: skip
+    path: ToolPath,
+    setup: Setup,
+    name: str,
+    label: str = "",
+    *,
+    T_base_basecorr: Transform | None = None,
+    options: ProgramOptions = DEFAULT_OPTIONS,
+    notes: Sequence[str] = (),
+    centroid_base_mm: ArrayLike | None = None,
+    verdict: Verdict | None = None,
+    acceptance: str = "",
+) -> Export:
     """Return the proven program of a decimated path; arguments as `build_program`.
 
     `verdict` of the alignment: `fail` is refused, `partial` needs `acceptance` (who and why), which then stands in the
@@ -59,8 +67,15 @@ def export(
         )
     accepted = (f"ACCEPTED {acceptance}",) if acceptance.strip() else ()
     program = build_program(
-        path, setup, name, label, T_base_basecorr=T_base_basecorr, options=options, notes=(*accepted, *notes), centroid_base_mm=centroid_base_mm,
-    )  # fmt: skip
+        path,
+        setup,
+        name,
+        label,
+        T_base_basecorr=T_base_basecorr,
+        options=options,
+        notes=(*accepted, *notes),
+        centroid_base_mm=centroid_base_mm,
+    )
     files = write_program(program)
     library = load(files)
     proof = prove(program, files, library)
@@ -97,13 +112,20 @@ def manifest(program: KrlProgram, files: dict[str, bytes], proof: Proof, accepta
         "files": {name: {"bytes": len(data), "sha256": proof.sha256[name]} for name, data in files.items()},
         "bytes": proof.bytes,
         "largest_difference": {"mm": proof.largest_mm, "deg": proof.largest_deg},
-        "base": {"number": program.base_number, "written": None if frame is None else [float(v) for v in frame],
-                 "composed": None if offset is None else [float(v) for v in offset]},
+        "base": {
+            "number": program.base_number,
+            "written": None if frame is None else [float(v) for v in frame],
+            "composed": None if offset is None else [float(v) for v in offset],
+        },
         "tool": {"number": program.tool_number},
         "signal": {"style": program.signal, "data_output": program.data_output, "wait_input": program.wait_input},
         "loads": loads,
-        "limits": {**program.limits, "used_bytes": max(load["bytes"] for load in loads), "used_lines": longest,
-                   "used_modules": max(len(load["modules"]) + 1 for load in loads)},
+        "limits": {
+            **program.limits,
+            "used_bytes": max(load["bytes"] for load in loads),
+            "used_lines": longest,
+            "used_modules": max(len(load["modules"]) + 1 for load in loads),
+        },
         "acceptance": acceptance,
         "issues": [i.to_json() for i in program.issues],
-    }  # fmt: skip
+    }

@@ -22,7 +22,7 @@ from kuka_export.program import (
     Statement,
     UseBase,
     UseTool,
-)  # fmt: skip
+)
 from planner.frames import Array
 from planner.setup import Setup
 
@@ -71,9 +71,19 @@ def base_module(name: str, base: BasePlan, nominal_number: int) -> Module:
 
 
 def main_module(
-    name: str, calls: list[str], base_call: str | None, base: BasePlan, setup: Setup, profile: Profile, options: ProgramOptions,
-    information: list[str], scan_speed_mm_s: float, blend_mm: float, data_output: int | None, start: Start | None,
-) -> Module:  # fmt: skip
+    name: str,
+    calls: list[str],
+    base_call: str | None,
+    base: BasePlan,
+    setup: Setup,
+    profile: Profile,
+    options: ProgramOptions,
+    information: list[str],
+    scan_speed_mm_s: float,
+    blend_mm: float,
+    data_output: int | None,
+    start: Start | None,
+) -> Module:
     """Return the main module. Frames are set after INI, which sets $BASE to WORLD; BASE_DATA before the first motion."""
     body: list[Statement] = []
     if profile.external_lines:
@@ -95,9 +105,14 @@ def main_module(
 
 
 def _settings(
-    base: BasePlan, setup: Setup, profile: Profile, options: ProgramOptions, scan_speed_mm_s: float, blend_mm: float,
+    base: BasePlan,
+    setup: Setup,
+    profile: Profile,
+    options: ProgramOptions,
+    scan_speed_mm_s: float,
+    blend_mm: float,
     data_output: int | None,
-) -> list[Statement]:  # fmt: skip
+) -> list[Statement]:
     tool = setup.tool.number
     rows = [
         ("$LOAD", f"LOAD_DATA[{tool}]"),
@@ -121,9 +136,16 @@ def _settings(
 
 
 def information(
-    title: str, label: str, base: BasePlan, setup: Setup, poses: Array, passes: int, options: ProgramOptions, notes: tuple[str, ...],
+    title: str,
+    label: str,
+    base: BasePlan,
+    setup: Setup,
+    poses: Array,
+    passes: int,
+    options: ProgramOptions,
+    notes: tuple[str, ...],
     load: str,
-) -> list[str]:  # fmt: skip
+) -> list[str]:
     """Return the comment lines of the main module: what this is, what it was planned with, what to check first."""
     low, high = poses[:, :3].min(axis=0), poses[:, :3].max(axis=0)
     span = " ".join(f"{k} {a:.1f}..{b:.1f}" for k, a, b in zip("XYZ", low + 0.0, high + 0.0, strict=True))

@@ -78,7 +78,8 @@ def pack_loads(packed: list[Packed], load_bytes: int, load_modules: int) -> list
         size = sum(p.bytes for p in group)
         if size > room_bytes or len(group) > room_modules:
             raise ValueError(
-                f"one pass takes {size} bytes in {len(group)} modules; a load holds {room_bytes} bytes in {room_modules} modules"
+                f"one pass takes {size} bytes in {len(group)} modules; a load holds {room_bytes} bytes"
+                f" in {room_modules} modules"
             )
         full = not loads or (
             sum(p.bytes for p in loads[-1]) + size > room_bytes or len(loads[-1]) + len(group) > room_modules

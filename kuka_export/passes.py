@@ -1,5 +1,6 @@
 """Passes as statements: approach, lead-in, scan with its data switch, lead-out, retract, links."""
 
+import itertools
 import math
 from dataclasses import dataclass
 
@@ -114,7 +115,7 @@ def _bounds(start: int, stop: int, most: int) -> list[tuple[int, int]]:
     n = stop - start
     parts = math.ceil(n / most)
     edges = [start + round(n * k / parts) for k in range(parts + 1)] if parts else []
-    return list(zip(edges[:-1], edges[1:], strict=True))
+    return list(itertools.pairwise(edges))
 
 
 def _points(r: Route, style: Style, a: int, b: int) -> list[Statement]:

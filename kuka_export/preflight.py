@@ -97,19 +97,23 @@ def check_route(r: Route, spline: bool) -> list[Issue]:
     issues: list[Issue] = []
     issues += [
         _error(
-            "krl-repeated-pose", "A data pose repeats the one before it to rounding; the robot would stop with message 1456.",
-            "Decimate the path, or ask for a wider point spacing.", _place(r, int(i)),
+            "krl-repeated-pose",
+            "A data pose repeats the one before it to rounding; the robot would stop with message 1456.",
+            "Decimate the path, or ask for a wider point spacing.",
+            _place(r, int(i)),
         )
         for i in np.flatnonzero(repeats(r.poses))[:10]
-    ]  # fmt: skip
+    ]
     first, last = data_switches(r)
     issues += [
         _error(
-            "krl-short-data", "A data run has a single pose: no reading lies between its ends.",
-            "Plan at least two data poses per pass.", _place(r, int(i)),
+            "krl-short-data",
+            "A data run has a single pose: no reading lies between its ends.",
+            "Plan at least two data poses per pass.",
+            _place(r, int(i)),
         )
         for i in np.flatnonzero(first & last)[:10]
-    ]  # fmt: skip
+    ]
     if not first.any():
         issues.append(
             _error("krl-no-data", "The path takes no data: it has no DATA pose.", "Plan the path again.", "path")
@@ -118,10 +122,13 @@ def check_route(r: Route, spline: bool) -> list[Issue]:
     if len(far):
         issues.append(
             _warn(
-                "krl-far", f"{len(far)} poses lie more than {SINGLE_PRECISION_MM:g} mm from the BASE origin, where the "
-                "controller's 32-bit numbers no longer hold micrometres.", "Move the BASE origin to the part.", _place(r, int(far[0])),
+                "krl-far",
+                f"{len(far)} poses lie more than {SINGLE_PRECISION_MM:g} mm from the BASE origin, where the "
+                "controller's 32-bit numbers no longer hold micrometres.",
+                "Move the BASE origin to the part.",
+                _place(r, int(far[0])),
             )
-        )  # fmt: skip
+        )
     return issues + _spacing_issues(r, spline)
 
 
@@ -133,10 +140,12 @@ def _spacing_issues(r: Route, spline: bool) -> list[Issue]:
     if len(close):
         issues.append(
             _warn(
-                "krl-close-poses", f"{len(close)} scan poses stand closer than {CLOSE_MM} mm to the one before; the robot will slow down.",
-                "Decimate the path.", _place(r, int(close[0])),
+                "krl-close-poses",
+                f"{len(close)} scan poses stand closer than {CLOSE_MM} mm to the one before; the robot will slow down.",
+                "Decimate the path.",
+                _place(r, int(close[0])),
             )
-        )  # fmt: skip
+        )
     if spline:
         after = np.append(step[1:], np.inf)
         both = inside & np.append(inside[1:], False)
@@ -150,10 +159,13 @@ def _spacing_issues(r: Route, spline: bool) -> list[Issue]:
         if len(odd):
             issues.append(
                 _warn(
-                    "krl-spline-spacing", f"{len(odd)} spline poses are spaced wider than {WIDE_MM:g} mm or unevenly (beyond 1:{WIDE_RATIO:g}); "
-                    "a smooth curve may leave the planned path there.", "Decimate the path with the spline check.", _place(r, int(odd[0])),
+                    "krl-spline-spacing",
+                    f"{len(odd)} spline poses are spaced wider than {WIDE_MM:g} mm or unevenly (beyond 1:{WIDE_RATIO:g}); "
+                    "a smooth curve may leave the planned path there.",
+                    "Decimate the path with the spline check.",
+                    _place(r, int(odd[0])),
                 )
-            )  # fmt: skip
+            )
     return issues
 
 

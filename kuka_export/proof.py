@@ -78,7 +78,8 @@ def _compare(program: KrlProgram, reading: KrlReading) -> tuple[list[str], float
     off = np.flatnonzero((mm > MM_ALLOWED).any(axis=1) | (deg > DEG_ALLOWED).any(axis=1))
     if len(off):
         faults.append(
-            f"{len(off)} poses differ by up to {mm.max():.4f} mm and {deg.max():.5f} deg, the first at {reading.module[off[0]]}:{reading.line[off[0]]}"
+            f"{len(off)} poses differ by up to {mm.max():.4f} mm and {deg.max():.5f} deg,"
+            f" the first at {reading.module[off[0]]}:{reading.line[off[0]]}"
         )
     meant = expected(program)
     path = reading.path

@@ -17,7 +17,8 @@ from planner.program_path import Motion, ProgramPath
 class KrlReading:
     """A program as read.
 
-    path: its Cartesian motions; poses (n, 6): their numbers as written, X Y Z A B C. base_number, tool_number: the indices it moves with (None: a frame of its own, 0: WORLD).
+    path: its Cartesian motions; poses (n, 6): their numbers as written, X Y Z A B C. base_number, tool_number: the
+    indices it moves with (None: a frame of its own, 0: WORLD).
     base_data: index -> X Y Z A B C of every base the files define. base_offset (6,): frame composed onto the base, or
     None. first_axes (6,): axis values of the first axis motion, or None; `first_axes_all`, of every main module. `main`,
     `mains`: modules a person selects; `modules`: all files' first routines; `calls`: (caller, called) in order.
@@ -118,9 +119,11 @@ def _reading(
     if len(states) > 1:
         row = out.bases[1][0]
         raise fail(
-            "krl-frames-change", "Base or tool change in the middle of the program.", "Use one base and one tool per program.",
+            "krl-frames-change",
+            "Base or tool change in the middle of the program.",
+            "Use one base and one tool per program.",
             f"{out.module[row]}:{out.lines[row]}",
-        )  # fmt: skip
+        )
     base, tool = next(iter(states))
     on, chosen, how, exact, notes = data_signal(out, data_output)
     words = np.array(out.words)
@@ -146,14 +149,35 @@ def _reading(
         pass_id=_passes(out),
     )
     return KrlReading(
-        path=path, poses=np.array(out.poses), base_number=base.number, tool_number=tool, base_data=dict(out.base_data), base_offset=base.offset,
-        base_frame=base.frame, first_axes=np.array(axes[0]) if axes else None,
-        first_axes_all=tuple(axes[i] for i in first_rows if i < len(axes)), main=mains[0], mains=tuple(mains),
-        modules=tuple(s.routines[0].name for s in library.sources() if s.routines), calls=tuple(out.calls), data_output=chosen,
-        data_source=how, exact_switching=exact, homes=len(out.homes), starts_at_home=home_first, waits=tuple(out.waits), axis_moves=tuple(out.axis_moves), basis=tuple(out.basis),
-        base_writes=tuple(out.base_writes), words=tuple(out.words), approximation=tuple(out.approximation),
-        module=tuple(out.module), line=np.array(out.lines), settings=tuple(out.settings), issues=(*out.notes, *notes),
-    )  # fmt: skip
+        path=path,
+        poses=np.array(out.poses),
+        base_number=base.number,
+        tool_number=tool,
+        base_data=dict(out.base_data),
+        base_offset=base.offset,
+        base_frame=base.frame,
+        first_axes=np.array(axes[0]) if axes else None,
+        first_axes_all=tuple(axes[i] for i in first_rows if i < len(axes)),
+        main=mains[0],
+        mains=tuple(mains),
+        modules=tuple(s.routines[0].name for s in library.sources() if s.routines),
+        calls=tuple(out.calls),
+        data_output=chosen,
+        data_source=how,
+        exact_switching=exact,
+        homes=len(out.homes),
+        starts_at_home=home_first,
+        waits=tuple(out.waits),
+        axis_moves=tuple(out.axis_moves),
+        basis=tuple(out.basis),
+        base_writes=tuple(out.base_writes),
+        words=tuple(out.words),
+        approximation=tuple(out.approximation),
+        module=tuple(out.module),
+        line=np.array(out.lines),
+        settings=tuple(out.settings),
+        issues=(*out.notes, *notes),
+    )
 
 
 def data_signal(out: Followed, wanted: int | None) -> tuple[NDArray[np.bool_], int | None, str, bool, list[Issue]]:

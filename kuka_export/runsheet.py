@@ -64,9 +64,13 @@ def run_sheet_html(program: KrlProgram, proof: Proof, setup: Setup) -> str:
     parts = [
         "<!doctype html><html lang=en><meta charset=utf-8>",
         f"<title>Run sheet {escape(program.name)}</title>",
-        "<style>body{font:14px/1.4 system-ui,sans-serif;max-width:48em;margin:2em auto}table{border-collapse:collapse;width:100%}"
-        "td{padding:.2em .6em .2em 0;vertical-align:top;border-bottom:1px solid #ddd}td+td{font-family:ui-monospace,monospace}"
-        "li{margin:.3em 0}h2{font-size:1em;margin:1.4em 0 .3em}</style>",
+        (
+            "<style>body{font:14px/1.4 system-ui,sans-serif;max-width:48em;margin:2em auto}"
+            "table{border-collapse:collapse;width:100%}"
+            "td{padding:.2em .6em .2em 0;vertical-align:top;border-bottom:1px solid #ddd}"
+            "td+td{font-family:ui-monospace,monospace}"
+            "li{margin:.3em 0}h2{font-size:1em;margin:1.4em 0 .3em}</style>"
+        ),
         f"<h1>Run sheet {escape(program.name)}</h1>",
     ]
     for section in sections(program, proof, setup):
@@ -123,6 +127,7 @@ def _steps(program: KrlProgram) -> tuple[tuple[str, str], ...]:
     if len(program.loads) > 1:
         steps.insert(
             1,
-            f"The program comes in {len(program.loads)} loads. Copy, run and delete one after the other: {', '.join(load.main for load in program.loads)}.",
+            f"The program comes in {len(program.loads)} loads. Copy, run and delete one after the other: "
+            f"{', '.join(load.main for load in program.loads)}.",
         )
     return tuple((s, "") for s in steps)

@@ -112,7 +112,7 @@ def _unary(c: Cursor) -> Expression:
         c.depth -= 1
 
 
-def _primary(c: Cursor) -> Expression:
+def _primary(c: Cursor) -> Expression:  # noqa: PLR0911 (one return a kind)
     t = c.token
     if t.kind == "number":
         c.next()

@@ -26,7 +26,7 @@ from kuka_export.language.nodes import (
     Statement,
     Trigger,
     Wait,
-)  # fmt: skip
+)
 from kuka_export.language.values import (
     UnknownValueError,
     Value,
@@ -42,8 +42,23 @@ from planner.errors import EchoBaseError, fail
 from planner.issues import Issue
 
 _PASS = re.compile(r"^\s*FOLD\s+PASS\s+(\d+)", re.IGNORECASE)
-_IGNORED = frozenset({"INTERRUPT DECL", "INTERRUPT ON", "INTERRUPT OFF", "INTERRUPT ENABLE", "INTERRUPT DISABLE", "CONTINUE", "LABEL",
-                      "HALT", "CONST_VEL START", "CONST_VEL END", "STRUC", "ENUM", "STOP WHEN"})  # fmt: skip
+_IGNORED = frozenset(
+    {
+        "INTERRUPT DECL",
+        "INTERRUPT ON",
+        "INTERRUPT OFF",
+        "INTERRUPT ENABLE",
+        "INTERRUPT DISABLE",
+        "CONTINUE",
+        "LABEL",
+        "HALT",
+        "CONST_VEL START",
+        "CONST_VEL END",
+        "STRUC",
+        "ENUM",
+        "STOP WHEN",
+    }
+)
 MAX_CALL_DEPTH = 30
 
 
@@ -232,9 +247,14 @@ class Follower:
         found = self.library.find(s.name, self.source)
         if found is None:
             self.out.notes.append(
-                Issue("warning", "krl-undeclared", f"{s.name} is called but not among the files; what it does is not known.", "Add its file.",
-                      f"{self.source.name}:{s.line}")
-            )  # fmt: skip
+                Issue(
+                    "warning",
+                    "krl-undeclared",
+                    f"{s.name} is called but not among the files; what it does is not known.",
+                    "Add its file.",
+                    f"{self.source.name}:{s.line}",
+                )
+            )
             return
         self.out.calls.append((routine.name, s.name))
         self.run(*found)

@@ -22,7 +22,7 @@ _PLAIN_MOVE = re.compile(
 )
 
 
-def parse_file(name: str, text: str, fast: bool = True) -> SourceFile:
+def parse_file(name: str, text: str, fast: bool = True) -> SourceFile:  # noqa: PLR0912 (one branch a kind)
     """Return the parsed file; `problems` holds (line, code, message) of every line that is not KRL."""
     source = SourceFile(name)
     lines = text.split("\n")

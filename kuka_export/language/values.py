@@ -31,7 +31,7 @@ class UnknownValueError(Exception):
         self.name = name
 
 
-def evaluate(e: Expression, known: Mapping[str, Value]) -> Value:
+def evaluate(e: Expression, known: Mapping[str, Value]) -> Value:  # noqa: PLR0911 (one return a kind)
     """Return the value of an expression; raises UnknownValueError for a name without one, KrlSyntaxError for nonsense."""
     if isinstance(e, Number):
         return e.value

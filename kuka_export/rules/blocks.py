@@ -32,7 +32,7 @@ _IN_PTP_SPLINE = frozenset({"SPTP", "SPTP_REL"})
 _SECTIONS = ("CONST_VEL", "TIME_BLOCK", "STOP WHEN")
 
 
-def check_control(routine: Routine) -> Iterator[Finding]:
+def check_control(routine: Routine) -> Iterator[Finding]:  # noqa: PLR0912 (one branch a kind)
     """Yield control blocks that do not close in order, words outside their block, jumps without a label."""
     stack: list[tuple[str, int]] = []
     labels: dict[str, int] = {}

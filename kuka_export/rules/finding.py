@@ -75,7 +75,7 @@ RULES: dict[str, Rule] = {
     "krl-spline-empty": Rule(None, "Put segments into the block, or remove it."),
     "krl-spline-long": Rule(3273, "Split the block."),
     "krl-spline-open": Rule(None, "Pair SPLINE with ENDSPLINE in the same routine."),
-    "krl-spline-statement": Rule(2359, "Inside a block stand SPL, SLIN, SCIRC, TRIGGER WHEN PATH, CONST_VEL, TIME_BLOCK, STOP WHEN."),
+    "krl-spline-statement": Rule(2359, "A block holds SPL, SLIN, SCIRC, TRIGGER WHEN PATH, CONST_VEL, TIME_BLOCK, STOP WHEN."),
     "krl-status": Rule(None, "S is 0 to 31; T is 0 to 4095, one bit an axis."),
     "krl-string": Rule(None, "Close the text."),
     "krl-sub-ini": Rule(None, "Only the module that is selected initialises; INI sets $BASE to WORLD."),

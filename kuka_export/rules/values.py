@@ -18,7 +18,7 @@ from kuka_export.language.nodes import (
     Routine,
     SplineOpen,
     Statement,
-)  # fmt: skip
+)
 from kuka_export.language.parse import constant
 from kuka_export.rules.finding import Finding
 from kuka_export.rules.walk import expressions_of, nested
@@ -29,10 +29,20 @@ OUTPUTS = 8192
 _INDEXED = ("BASE_DATA", "TOOL_DATA", "LOAD_DATA")
 # Variable -> lowest and highest value.
 _RANGES = {
-    "$ADVANCE": (0.0, 5.0), "$APO.CDIS": (0.0, 1e4), "$APO.CORI": (0.0, 360.0), "$APO.CVEL": (0.0, 100.0), "$APO.CPTP": (0.0, 100.0),
-    "$VEL.ORI1": (1e-6, 1e4), "$VEL.ORI2": (1e-6, 1e4), "$ACC.CP": (1e-6, 100.0), "$ACC.ORI1": (1e-6, 1e5), "$ACC.ORI2": (1e-6, 1e5),
-    "$OV_PRO": (0.0, 100.0), "$VEL_AXIS": (0.0, 100.0), "$ACC_AXIS": (0.0, 100.0),
-}  # fmt: skip
+    "$ADVANCE": (0.0, 5.0),
+    "$APO.CDIS": (0.0, 1e4),
+    "$APO.CORI": (0.0, 360.0),
+    "$APO.CVEL": (0.0, 100.0),
+    "$APO.CPTP": (0.0, 100.0),
+    "$VEL.ORI1": (1e-6, 1e4),
+    "$VEL.ORI2": (1e-6, 1e4),
+    "$ACC.CP": (1e-6, 100.0),
+    "$ACC.ORI1": (1e-6, 1e5),
+    "$ACC.ORI2": (1e-6, 1e5),
+    "$OV_PRO": (0.0, 100.0),
+    "$VEL_AXIS": (0.0, 100.0),
+    "$ACC_AXIS": (0.0, 100.0),
+}
 
 
 def check_values(routine: Routine, bases: int, tools: int) -> Iterator[Finding]:
@@ -84,6 +94,10 @@ def _settings(s: Statement, bases: int, tools: int) -> Iterator[Finding]:
             if not low <= got <= high:
                 code = "krl-advance" if target.dotted == "$ADVANCE" else "krl-range"
                 yield Finding(s.line, code, f"{target.dotted} is {got:g}; it goes from {low:g} to {high:g}")
+    yield from _orders(s, bases, tools)
+
+
+def _orders(s: Statement, bases: int, tools: int) -> Iterator[Finding]:
     if (
         isinstance(s, CallStatement)
         and s.name == "BAS"

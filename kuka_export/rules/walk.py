@@ -22,7 +22,7 @@ from kuka_export.language.nodes import (
 )  # fmt: skip
 
 
-def expressions_of(s: Statement) -> Iterator[Expression]:
+def expressions_of(s: Statement) -> Iterator[Expression]:  # noqa: PLR0912 (one branch a kind)
     """Yield the expressions a statement reads or writes; declared names are not among them."""
     if isinstance(s, Assign):
         yield from (s.target, s.value)

@@ -1,5 +1,7 @@
 """KRL that must be refused: what is wrong, the rule that says so, the KSS message it would provoke where that is known."""
 
+# ruff: noqa: E501 (KRL text stays in one piece)
+
 from typing import NamedTuple
 
 HEAD = "&ACCESS RVP\n&REL 1\n"

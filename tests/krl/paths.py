@@ -24,7 +24,9 @@ def correction(numbers: tuple[float, ...] = CORRECTION) -> Transform:
     return Transform.from_xyzabc("base", "basecorr", numbers)
 
 
-def from_arrays(kind: PathKind, points: Array, normals: Array, travel: Array, role: Array, pass_id: Array, heading: Array) -> ToolPath:
+def from_arrays(
+    kind: PathKind, points: Array, normals: Array, travel: Array, role: Array, pass_id: Array, heading: Array
+) -> ToolPath:
     n = normals / np.linalg.norm(normals, axis=1, keepdims=True)
     x = travel - (travel * n).sum(axis=1, keepdims=True) * n
     x /= np.linalg.norm(x, axis=1, keepdims=True)
@@ -37,10 +39,19 @@ def from_arrays(kind: PathKind, points: Array, normals: Array, travel: Array, ro
     )  # fmt: skip
 
 
-def raster(kind: PathKind = "inspection", data: int = 12, passes: int = 3, step: float = 8.0, wave: float = 0.0, link: int = 0) -> ToolPath:
+def raster(
+    kind: PathKind = "inspection", data: int = 12, passes: int = 3, step: float = 8.0, wave: float = 0.0, link: int = 0
+) -> ToolPath:
     """Forth-and-back passes over z = wave sin(x / 60); each with approach, lead-in, data, lead-out, retract, `link` poses."""
     roles = [Role.APPROACH, Role.LEAD_IN] + [Role.DATA] * data + [Role.LEAD_OUT, Role.RETRACT] + [Role.LINK] * link
-    along = np.concatenate([[-10.0, -10.0], np.arange(data) * step, [(data - 1) * step + 10.0] * 2, (data - 1) * step + 10.0 + 3.0 * np.arange(1, link + 1)])
+    along = np.concatenate(
+        [
+            [-10.0, -10.0],
+            np.arange(data) * step,
+            [(data - 1) * step + 10.0] * 2,
+            (data - 1) * step + 10.0 + 3.0 * np.arange(1, link + 1),
+        ]
+    )
     points, normals, travel = [], [], []
     for k in range(passes):
         way = 1.0 if k % 2 == 0 else -1.0

@@ -1,5 +1,7 @@
 """Legal programs as other people write them: other styles, other words, other generations. Text of this project."""
 
+# ruff: noqa: E501 (KRL text stays in one piece)
+
 _INI = """;FOLD INI;%{PE}
   ;FOLD BASISTECH INI
     GLOBAL INTERRUPT DECL 3 WHEN $STOPMESS==TRUE DO IR_STOPM ( )

@@ -54,7 +54,14 @@ def flange_kr16_l6(axes: np.ndarray) -> np.ndarray:
         return hom(Rotation.from_euler("X", deg, degrees=True).as_matrix(), xyz)
 
     a1, a2, a3, a4, a5, a6 = axes
-    arm = rz(-a1) @ ry(a2, (260, 0, 675)) @ ry(a3, (680, 0, 0)) @ rx(-a4, (970, 0, -35)) @ ry(a5, (0, 0, 0)) @ rx(-a6, (0, 0, 0))
+    arm = (
+        rz(-a1)
+        @ ry(a2, (260, 0, 675))
+        @ ry(a3, (680, 0, 0))
+        @ rx(-a4, (970, 0, -35))
+        @ ry(a5, (0, 0, 0))
+        @ rx(-a6, (0, 0, 0))
+    )
     return arm @ ry(90, (115, 0, 0))
 
 
@@ -144,7 +151,9 @@ def test_the_corrected_base_is_the_nominal_times_the_correction_and_may_have_its
 def test_a_correction_changes_the_base_and_nothing_else(controller: str, taught: bool, motion: str | None):
     s, options = setup(controller, taught), ProgramOptions(motion=motion)
     nominal = export(PATHS["wave"], s, "EB_JOB", options=options)
-    corrected = export(PATHS["wave"], s, "EB_JOB", "another label", T_base_basecorr=correction(), options=options, notes=("n",))
+    corrected = export(
+        PATHS["wave"], s, "EB_JOB", "another label", T_base_basecorr=correction(), options=options, notes=("n",)
+    )
     motion_files = {n for n in nominal.files if re.search(r"_\d{3}\.src$", n)}
     assert motion_files
     assert {n: nominal.files[n] for n in motion_files} == {n: corrected.files[n] for n in motion_files}
@@ -153,7 +162,9 @@ def test_a_correction_changes_the_base_and_nothing_else(controller: str, taught:
 
 def test_adapted_poses_get_modules_of_their_own():
     plain = export(PATHS["plane"], setup(), "EB_JOB")
-    adapted = export(PATHS["plane"], setup(), "EB_JOB", T_base_basecorr=correction(), options=ProgramOptions(adapted=True))
+    adapted = export(
+        PATHS["plane"], setup(), "EB_JOB", T_base_basecorr=correction(), options=ProgramOptions(adapted=True)
+    )
     assert not plain.files.keys() & adapted.files.keys()
 
 
@@ -196,7 +207,13 @@ def test_long_passes_become_blocks_without_a_gap_in_the_data(controller: str):
 def test_krc4_uses_the_spline_family_only_after_its_first_motion():
     for motion in (None, "lin"):
         made = export(PATHS["wave"], setup("krc4"), "EB_JOB", options=ProgramOptions(home=True, motion=motion))
-        words = [t.split()[0] for n in sorted(made.files) if n.endswith(".src") for t in lines(made.files, n) if re.match(r"[A-Z_]+ ([{X])", t)]
+        words = [
+            t.split()[0]
+            for n in sorted(made.files)
+            if n.endswith(".src")
+            for t in lines(made.files, n)
+            if re.match(r"[A-Z_]+ ([{X])", t)
+        ]
         assert words.count("PTP") == 1
         assert not set(words) & {"LIN", "CIRC"}
         assert texts(made.files).count("SPTP XHOME") == 1
@@ -217,7 +234,11 @@ def test_blending_is_at_most_half_the_closest_spacing():
 
 def test_waits_stand_before_every_pass_and_are_read_back():
     made = export(PATHS["plane"], setup(signals={"data_output": 2, "wait_input": 11}), "EB_JOB")
-    assert texts(made.files).count("WAIT FOR $IN[11]==TRUE\r\nSLIN") + texts(made.files).count("WAIT FOR $IN[11]==TRUE\r\n$VEL") == 3
+    assert (
+        texts(made.files).count("WAIT FOR $IN[11]==TRUE\r\nSLIN")
+        + texts(made.files).count("WAIT FOR $IN[11]==TRUE\r\n$VEL")
+        == 3
+    )
     assert len(read_program(made.files).waits) == 3
 
 
@@ -235,7 +256,9 @@ def test_repeated_poses_between_link_and_approach_are_dropped():
     path = PATHS["plane"]
     rows = np.repeat(np.arange(len(path)), np.where((path.role == Role.APPROACH) | (path.role == Role.LEAD_IN), 3, 1))
     made = export(path.take(rows), setup(), "EB_JOB")
-    np.testing.assert_array_equal(read_program(made.files).poses, read_program(export(path, setup(), "EB_JOB").files).poses)
+    np.testing.assert_array_equal(
+        read_program(made.files).poses, read_program(export(path, setup(), "EB_JOB").files).poses
+    )
 
 
 @pytest.mark.parametrize(
@@ -246,7 +269,10 @@ def test_repeated_poses_between_link_and_approach_are_dropped():
         ({"name": "LOOP"}, "krl-name"),
         ({"options": ProgramOptions(scan_speed_mm_s=3001.0)}, "krl-speed"),
         ({"options": ProgramOptions(link_speed_mm_s=9e9)}, "krl-speed"),
-        ({"setup": setup("krc2").model_copy(update={"base": setup().base.model_copy(update={"number": 17})})}, "krl-index"),
+        (
+            {"setup": setup("krc2").model_copy(update={"base": setup().base.model_copy(update={"number": 17})})},
+            "krl-index",
+        ),
         ({"setup": setup("krc2"), "options": ProgramOptions(motion="spline")}, "krl-motion"),
         ({"T": correction((14.0, 0, 0, 0, 3.0, 0))}, "correction-limit"),
         ({"T": correction((0, 0, 0, 3.51, 0, 0))}, "correction-limit"),
@@ -270,8 +296,9 @@ def test_faults_are_found_before_a_line_is_written(change: dict, code: str):
 
 
 def test_all_faults_come_at_once():
+    far = setup().base.model_copy(update={"number": 30})
     with pytest.raises(EchoBaseError) as caught:
-        build_program(raster(), setup("krc2").model_copy(update={"base": setup().base.model_copy(update={"number": 30})}), "no good",
+        build_program(raster(), setup("krc2").model_copy(update={"base": far}), "no good",
                       options=ProgramOptions(link_speed_mm_s=4000.0, motion="spline"))  # fmt: skip
     assert {"krl-name", "krl-index", "krl-speed", "krl-motion"} <= codes(caught.value)
 
@@ -281,7 +308,13 @@ def test_poses_that_are_not_numbers_never_become_text():
     bad = path.standoff_mm.copy()
     bad[5] = np.nan
     with pytest.raises(EchoBaseError) as caught:
-        build_program(type(path)(path.kind, path.Ts_part_contact, bad, path.heading, path.pass_id, path.role, path.face, path.bary), setup(), "EB_JOB")
+        build_program(
+            type(path)(
+                path.kind, path.Ts_part_contact, bad, path.heading, path.pass_id, path.role, path.face, path.bary
+            ),
+            setup(),
+            "EB_JOB",
+        )
     assert codes(caught.value) == {"krl-not-finite"}
 
 
@@ -297,7 +330,14 @@ def test_verdicts():
         export(raster(), setup(), "EB_JOB", T_base_basecorr=correction(), verdict="fail", acceptance="me")
     with pytest.raises(EchoBaseError, match="partial"):
         export(raster(), setup(), "EB_JOB", T_base_basecorr=correction(), verdict="partial")
-    made = export(raster(), setup(), "EB_JOB", T_base_basecorr=correction(), verdict="partial", acceptance="A. Person: Z and B suffice")
+    made = export(
+        raster(),
+        setup(),
+        "EB_JOB",
+        T_base_basecorr=correction(),
+        verdict="partial",
+        acceptance="A. Person: Z and B suffice",
+    )
     assert ";NOTE ACCEPTED A. Person: Z and B suffice" in lines(made.files, "EB_JOB_C.src")
     assert made.manifest["acceptance"].startswith("A. Person")
 

@@ -54,7 +54,10 @@ def test_every_code_has_a_rule_with_a_remedy():
 def test_a_name_that_no_file_declares_is_a_warning_and_says_so_once():
     text = "DEF JOB ( )\nMYSTERY (1)\nMYSTERY (2)\nMYFLAG = TRUE\nEND\n"
     issues = check_files(encoded({"JOB.src": text}))
-    assert [(i.severity, i.where) for i in issues if i.code == "krl-undeclared"] == [("warning", "JOB.src:2"), ("warning", "JOB.src:4")]
+    assert [(i.severity, i.where) for i in issues if i.code == "krl-undeclared"] == [
+        ("warning", "JOB.src:2"),
+        ("warning", "JOB.src:4"),
+    ]
 
 
 def test_lines_that_git_normalised_are_a_warning_only():
@@ -64,7 +67,8 @@ def test_lines_that_git_normalised_are_a_warning_only():
 
 
 def test_mixed_motion_families_are_a_warning():
-    text = "DEF JOB ( )\nLIN {X 1.0,Y 0.0,Z 0.0,A 0.0,B 0.0,C 0.0}\nLIN {X 2.0,Y 0.0,Z 0.0,A 0.0,B 0.0,C 0.0}\nSLIN {X 3.0,Y 0.0,Z 0.0,A 0.0,B 0.0,C 0.0}\nEND\n"
+    moves = [f"{word} {{X {k}.0,Y 0.0,Z 0.0,A 0.0,B 0.0,C 0.0}}" for k, word in enumerate(("LIN", "LIN", "SLIN"))]
+    text = "\n".join(["DEF JOB ( )", *moves, "END", ""])
     assert "krl-mixed-families" in {i.code for i in check_files(encoded({"JOB.src": text})) if i.severity == "warning"}
 
 

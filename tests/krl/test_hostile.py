@@ -42,7 +42,17 @@ def test_labels_notes_operator_and_date_change_comments_only(text: str, taught: 
     s = setup("krc4", taught)
     plain = export(raster(), s, "EB_JOB", T_base_basecorr=correction(), verdict="partial", acceptance="x")
     options = ProgramOptions(operator=text, date=text)
-    made = export(raster(), s, "EB_JOB", text, T_base_basecorr=correction(), options=options, notes=[text, text], verdict="partial", acceptance="x " + text)
+    made = export(
+        raster(),
+        s,
+        "EB_JOB",
+        text,
+        T_base_basecorr=correction(),
+        options=options,
+        notes=[text, text],
+        verdict="partial",
+        acceptance="x " + text,
+    )
     assert words(made.files) == words(plain.files)
     assert check_files(made.files, "krc4") == []
     assert max(len(line) for data in made.files.values() for line in data.split(b"\r\n")) < 200

@@ -14,6 +14,7 @@ from kuka_export.language.lexer import tokens
 from kuka_export.language.vocabulary import KEYWORDS
 from kuka_export.names import MAX_STEM, duplicates, legal_name, name_problem
 from kuka_export.numbers import axes_text, frame_text, real_text, written_frames
+from planner.frames import Transform
 
 FRAME = re.compile(r"\{X -?\d+\.\d{3},Y -?\d+\.\d{3},Z -?\d+\.\d{3},A -?\d+\.\d{4},B -?\d+\.\d{4},C -?\d+\.\d{4}\}")
 wide = st.floats(-1e4, 1e4)
@@ -39,9 +40,14 @@ def test_a_frame_is_text_of_fixed_form_and_the_same_frame(values: tuple[float, .
 
 
 def test_the_seam_at_180_and_negative_zero():
-    assert frame_text([-0.0004, 0.0, -0.0, -180.0, -0.00004, -179.99996]) == "{X 0.000,Y 0.000,Z 0.000,A 180.0000,B 0.0000,C 180.0000}"
+    assert (
+        frame_text([-0.0004, 0.0, -0.0, -180.0, -0.00004, -179.99996])
+        == "{X 0.000,Y 0.000,Z 0.000,A 180.0000,B 0.0000,C 180.0000}"
+    )
     assert frame_text([0, 0, 0, 179.99996, 0, 540.0]) == "{X 0.000,Y 0.000,Z 0.000,A 180.0000,B 0.0000,C 180.0000}"
-    assert axes_text([-0.00001, 1, 2, 3, 4, -360.5]) == "{A1 0.0000,A2 1.0000,A3 2.0000,A4 3.0000,A5 4.0000,A6 -360.5000}"
+    assert (
+        axes_text([-0.00001, 1, 2, 3, 4, -360.5]) == "{A1 0.0000,A2 1.0000,A3 2.0000,A4 3.0000,A5 4.0000,A6 -360.5000}"
+    )
 
 
 @pytest.mark.parametrize("bad", [np.nan, np.inf, -np.inf])
@@ -64,8 +70,6 @@ def test_settings_never_carry_an_exponent(value: float):
 def test_abc_agree_with_another_library_on_ten_thousand_frames():
     rng = np.random.default_rng(5)
     rotations = Rotation.random(10_000, rng=rng)
-    from planner.frames import Transform
-
     frames = Transform.from_parts("base", "tcp", rotations, rng.uniform(-2000, 2000, (10_000, 3)))
     written = written_frames(frames.xyzabc)
     theirs = np.array([np.array(KUKA_2_Pose(list(row)).Rows()) for row in written.tolist()])

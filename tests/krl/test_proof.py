@@ -1,5 +1,6 @@
 """A program whose text was touched does not pass its proof."""
 
+import itertools
 import re
 
 import numpy as np
@@ -18,7 +19,9 @@ SIGNALS = {"signals": {"data_output": 7, "wait_input": 4}}
 
 def made(controller: str, taught: bool = True) -> tuple[KrlProgram, dict[str, bytes]]:
     s = setup(controller, taught, **SIGNALS)
-    program = build_program(raster("alignment", 6, 2, 9.0, 4.0, 2), s, "EB_MUT", T_base_basecorr=correction(), options=OPTIONS)
+    program = build_program(
+        raster("alignment", 6, 2, 9.0, 4.0, 2), s, "EB_MUT", T_base_basecorr=correction(), options=OPTIONS
+    )
     return program, write_program(program)
 
 
@@ -34,7 +37,12 @@ INI = {
 
 
 def lines_of(files: dict[str, bytes]) -> list[tuple[str, int, str]]:
-    return [(n, i, t) for n, d in files.items() for i, t in enumerate(d.decode("ascii").split("\r\n")) if is_motion_matter(t)]
+    return [
+        (n, i, t)
+        for n, d in files.items()
+        for i, t in enumerate(d.decode("ascii").split("\r\n"))
+        if is_motion_matter(t)
+    ]
 
 
 def with_line(files: dict[str, bytes], name: str, row: int, new: list[str]) -> dict[str, bytes]:
@@ -55,7 +63,9 @@ def test_the_untouched_program_is_proven(controller: str, taught: bool):
 def test_every_deleted_line_is_noticed(controller: str, taught: bool):
     program, files = made(controller, taught)
     # EXT lines only tell an old linker what it will find; calls without them still read the same.
-    unnoticed = [t for n, i, t in lines_of(files) if not t.startswith("EXT ") and prove(program, with_line(files, n, i, [])).ok]
+    unnoticed = [
+        t for n, i, t in lines_of(files) if not t.startswith("EXT ") and prove(program, with_line(files, n, i, [])).ok
+    ]
     # The speed of a motion is set again where the next pass begins: one such line may be the same as before.
     assert [t for t in unnoticed if not t.startswith("$VEL.CP = ")] == []
     assert len(unnoticed) <= 3
@@ -73,7 +83,7 @@ def test_every_doubled_motion_trigger_and_call_is_noticed(controller: str, taugh
 def test_every_swap_of_neighbouring_motions_is_noticed(controller: str, taught: bool):
     program, files = made(controller, taught)
     rows = [(n, i, t) for n, i, t in lines_of(files) if re.match(r"(S?LIN|SPL) ", t)]
-    pairs = [(n, i, t, u) for (n, i, t), (m, j, u) in zip(rows, rows[1:], strict=False) if n == m and j == i + 1 and t != u]
+    pairs = [(n, i, t, u) for (n, i, t), (m, j, u) in itertools.pairwise(rows) if n == m and j == i + 1 and t != u]
     assert len(pairs) > 10
     for n, i, t, u in pairs:
         swapped = with_line(with_line(files, n, i, [u]), n, i + 1, [t])
@@ -109,7 +119,11 @@ def test_random_bytes_in_meaningful_places_are_noticed(controller: str, taught: 
         at = int(rng.integers(0, len(t)))
         byte = chr(int(rng.integers(33, 127)))
         changed = t[:at] + byte + t[at + 1 :]
-        harmless = re.sub(r"\s+", "", changed.upper()) == re.sub(r"\s+", "", t.upper()) or t[at] == " " or t[:at].endswith(" ( ")
+        harmless = (
+            re.sub(r"\s+", "", changed.upper()) == re.sub(r"\s+", "", t.upper())
+            or t[at] == " "
+            or t[:at].endswith(" ( ")
+        )
         # A semicolon turns the rest into a comment; it must be noticed unless nothing but blanks follows.
         if not harmless and prove(program, with_line(files, n, i, [changed])).ok:
             missed.append((t, changed))
@@ -123,7 +137,15 @@ def test_a_missing_an_added_and_a_renamed_file_are_noticed():
     assert not prove(program, {("EB_Y.src" if k == "EB_MUT_001.src" else k): v for k, v in files.items()}).ok
 
 
-@pytest.mark.parametrize("damage", [lambda d: d.replace(b"\r\n", b"\n"), lambda d: d[:-2], lambda d: d.replace(b";PART", b";P\xc4RT"), lambda d: d + b"\x1a"])
+@pytest.mark.parametrize(
+    "damage",
+    [
+        lambda d: d.replace(b"\r\n", b"\n"),
+        lambda d: d[:-2],
+        lambda d: d.replace(b";PART", b";P\xc4RT"),
+        lambda d: d + b"\x1a",
+    ],
+)
 def test_bytes_no_reader_of_meaning_would_see_are_noticed(damage):
     program, files = made("krc4")
     assert not prove(program, {**files, "EB_MUT_C.src": damage(files["EB_MUT_C.src"])}).ok

@@ -1,5 +1,7 @@
 """Programs of other people, read as a path."""
 
+# ruff: noqa: E501 (KRL text stays in one piece)
+
 import numpy as np
 import pytest
 
@@ -10,7 +12,10 @@ from tests.krl.positive import POSITIVE
 
 
 def src(body: str, name: str = "JOB", **other: str) -> dict[str, bytes]:
-    files = {f"{name}.src": f"DEF {name} ( )\n{body}END\n", **{k.replace("_dat", ".dat").replace("_src", ".src"): v for k, v in other.items()}}
+    files = {
+        f"{name}.src": f"DEF {name} ( )\n{body}END\n",
+        **{k.replace("_dat", ".dat").replace("_src", ".src"): v for k, v in other.items()},
+    }
     return {k: v.encode() for k, v in files.items()}
 
 
@@ -28,7 +33,10 @@ def test_lower_case_and_speed_and_frames():
 
 
 def test_inline_forms_take_points_frames_and_speeds_from_the_data_list():
-    r = read_program({k: v.encode() for k, v in POSITIVE["inline-form-classic"].items() if True} | {"HOMES.dat": b"DEFDAT HOMES\nDECL FDAT FHOME={TOOL_NO 1,BASE_NO 1}\nENDDAT\n"})
+    r = read_program(
+        {k: v.encode() for k, v in POSITIVE["inline-form-classic"].items() if True}
+        | {"HOMES.dat": b"DEFDAT HOMES\nDECL FDAT FHOME={TOOL_NO 1,BASE_NO 1}\nENDDAT\n"}
+    )
     np.testing.assert_array_equal(r.poses, [[701.5, -20.25, 333.0, 90.0, 0.5, 179.5]])
     assert r.path.speed_mm_s[0] == 250.0
 
@@ -67,13 +75,17 @@ def test_switching_points_of_every_kind():
 
 
 def test_plain_outputs_are_a_data_signal_too():
-    r = read_program(src(f"LIN {pose(0)}\nCONTINUE\n$OUT[5]=TRUE\nLIN {pose(1)}\nLIN {pose(2)}\n$OUT[5]=FALSE\nLIN {pose(3)}\n"))
+    r = read_program(
+        src(f"LIN {pose(0)}\nCONTINUE\n$OUT[5]=TRUE\nLIN {pose(1)}\nLIN {pose(2)}\n$OUT[5]=FALSE\nLIN {pose(3)}\n")
+    )
     assert r.path.data_on.tolist() == [False, True, True, False]
     assert (r.data_output, r.data_source) == (5, "assignment")
 
 
 def test_a_delayed_trigger_is_read_but_not_called_exact():
-    r = read_program(src(f"LIN {pose(0)}\nTRIGGER WHEN PATH=-3 DELAY=10 DO $OUT[3]=TRUE\nLIN {pose(1)}\nLIN {pose(2)}\n"))
+    r = read_program(
+        src(f"LIN {pose(0)}\nTRIGGER WHEN PATH=-3 DELAY=10 DO $OUT[3]=TRUE\nLIN {pose(1)}\nLIN {pose(2)}\n")
+    )
     assert r.path.data_on.tolist() == [False, False, True]
     assert not r.exact_switching
 
@@ -95,7 +107,11 @@ def test_a_cascade_of_modules_and_passes_by_module():
 
 
 def test_the_base_in_world():
-    r = read_program(src(f"BASE_DATA[4] = {{X 100,Y 0,Z 0,A 90,B 0,C 0}}\n$BASE = BASE_DATA[4] : {{X 10,Y 0,Z 0,A 0,B 0,C 0}}\nLIN {pose(1)}\n"))
+    r = read_program(
+        src(
+            f"BASE_DATA[4] = {{X 100,Y 0,Z 0,A 90,B 0,C 0}}\n$BASE = BASE_DATA[4] : {{X 10,Y 0,Z 0,A 0,B 0,C 0}}\nLIN {pose(1)}\n"
+        )
+    )
     np.testing.assert_allclose(r.T_world_base.xyzabc, [100, 10, 0, 90, 0, 0], atol=1e-12)
 
 

@@ -1,5 +1,7 @@
 """Random paths, random setups: text of the agreed form, and the same path back."""
 
+# ruff: noqa: E501 (KRL text stays in one piece)
+
 import re
 
 import numpy as np
@@ -19,7 +21,9 @@ from planner.toolpath import Role, ToolPath
 from tests.krl.paths import correction, raster, setup
 
 NUMBER = re.compile(r"-?\d+(\.\d+)?([eE][+-]?\d+)?")
-STARTS = re.compile(r"(&|;|  |$|DEF |END$|EXT |DECL |DEFDAT |ENDDAT$|BASE_DATA\[|\$[A-Z]|S?PTP |S?LIN |SPL |SPLINE |ENDSPLINE$|TRIGGER |WAIT FOR |EB_)")
+STARTS = re.compile(
+    r"(&|;|  |$|DEF |END$|EXT |DECL |DEFDAT |ENDDAT$|BASE_DATA\[|\$[A-Z]|S?PTP |S?LIN |SPL |SPLINE |ENDSPLINE$|TRIGGER |WAIT FOR |EB_)"
+)
 
 
 @st.composite
@@ -32,13 +36,24 @@ def paths(draw: st.DrawFn) -> ToolPath:
         links, lead = draw(st.integers(0, 3)), draw(st.integers(0, 2))
         runs = [draw(st.integers(2, 30)) for _ in range(draw(st.integers(1, 3)))]
         body = [r for n in runs for r in [Role.DATA] * n + [Role.LEAD_OUT]][:-1]
-        one = [Role.LINK] * links + [Role.APPROACH] + [Role.LEAD_IN] * lead + body + [Role.LEAD_OUT] * lead + [Role.RETRACT]
+        one = (
+            [Role.LINK] * links
+            + [Role.APPROACH]
+            + [Role.LEAD_IN] * lead
+            + body
+            + [Role.LEAD_OUT] * lead
+            + [Role.RETRACT]
+        )
         roles += [int(r) for r in one]
         passes += [k] * len(one)
     n = len(roles)
     extreme = draw(st.sampled_from([1.0, 1e-3, 50.0]))
     points = np.cumsum(rng.normal(0.0, 10.0 * extreme, (n, 3)), axis=0)
-    rotations = Rotation.random(n, rng=rng) if draw(st.booleans()) else Rotation.from_euler("ZYX", np.tile([10.0, 89.9999, -180.0], (n, 1)), degrees=True)
+    rotations = (
+        Rotation.random(n, rng=rng)
+        if draw(st.booleans())
+        else Rotation.from_euler("ZYX", np.tile([10.0, 89.9999, -180.0], (n, 1)), degrees=True)
+    )
     contact = Transform.from_parts("part", "contact", rotations, points)
     return ToolPath(kind, contact, rng.uniform(5, 80, n), rng.choice([-1, 1], n).astype(np.int8), np.array(passes, dtype=np.int32),
                     np.array(roles, dtype=np.uint8), np.zeros(n, dtype=np.int32), np.zeros((n, 3)))  # fmt: skip
@@ -49,11 +64,17 @@ def paths(draw: st.DrawFn) -> ToolPath:
     paths(), st.sampled_from(["krc2", "krc4", "krc5"]), st.sampled_from([None, "lin"]), st.sampled_from(["trigger", "pulse", "none"]),
     st.booleans(), st.integers(4, 12), st.sampled_from(["x", "-y", "z"]),
 )  # fmt: skip
-def test_random_programs(path: ToolPath, controller: str, motion: str, signal: str, corrected: bool, segments: int, beam: str):
-    s = setup(controller, taught=False, tool={"number": 1, "beam_axis": beam, "array_axis": "x" if beam != "x" else "z"})
+def test_random_programs(
+    path: ToolPath, controller: str, motion: str, signal: str, corrected: bool, segments: int, beam: str
+):
+    s = setup(
+        controller, taught=False, tool={"number": 1, "beam_axis": beam, "array_axis": "x" if beam != "x" else "z"}
+    )
     options = ProgramOptions(motion=motion, signal=signal, segments=segments, module_lines=60)
     T = correction((0.5, -0.25, 0.125, 0.1, -0.2, 0.05)) if corrected else None
-    program = build_program(path, s, "EB_RND", "r", T_base_basecorr=T, options=options, centroid_base_mm=[0.0, 0.0, 0.0])
+    program = build_program(
+        path, s, "EB_RND", "r", T_base_basecorr=T, options=options, centroid_base_mm=[0.0, 0.0, 0.0]
+    )
     files = write_program(program)
     for name, data in files.items():
         assert re.fullmatch(r"[A-Z][A-Z0-9_]{0,23}\.(src|dat)", name)

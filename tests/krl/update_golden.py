@@ -16,14 +16,20 @@ def programs() -> Iterator[tuple[str, dict[str, bytes]]]:
     for controller in ("krc2", "krc4", "krc5"):
         taught, untaught = setup(controller), setup(controller, taught=False)
         notes = ("golden",)
-        yield f"{controller}/alignment", export(raster("alignment", 6, 2, 9.0, 4.0, 2), taught, "EB_GOLD_AL", "gold part", notes=notes).files
+        yield (
+            f"{controller}/alignment",
+            export(raster("alignment", 6, 2, 9.0, 4.0, 2), taught, "EB_GOLD_AL", "gold part", notes=notes).files,
+        )
         yield f"{controller}/inspection", export(cylinder(data=9, passes=2), taught, "EB_GOLD_IN", "gold part").files
         corrected = export(cylinder(data=9, passes=2), taught, "EB_GOLD_IN", "gold part", T_base_basecorr=correction())
         yield f"{controller}/corrected", corrected.files
         loose = export(cylinder(data=9, passes=2), untaught, "EB_GOLD_UN", "gold part", T_base_basecorr=correction())
         yield f"{controller}/corrected_untaught", loose.files
         options = ProgramOptions(motion="lin", signal="pulse", home=True, operator="A. Person", date="2026-01-31")
-        yield f"{controller}/lin_pulse_home", export(raster(data=8), setup(controller, **signals), "EB_GOLD_LP", "gold part", options=options).files
+        yield (
+            f"{controller}/lin_pulse_home",
+            export(raster(data=8), setup(controller, **signals), "EB_GOLD_LP", "gold part", options=options).files,
+        )
 
 
 def main() -> None:
