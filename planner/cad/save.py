@@ -29,7 +29,7 @@ def save_part(part: Part, path: Path) -> None:
 def load_part(path: Path) -> Part:
     """Return the part written by `save_part`. Raises EchoBaseError `part-file` if it is not one."""
     try:
-        with np.load(path, allow_pickle=False) as stored:
+        with path.open("rb") as file, np.load(file, allow_pickle=False) as stored:
             about = json.loads(stored["about"].tobytes().decode("utf-8"))
             vertices, faces = stored["vertices"], stored["faces"]
         if about["version"] != VERSION:

@@ -10,11 +10,14 @@ from planner.frames import Array
 from planner.setup import Probe
 from planner.surface.closest import Foot
 from planner.surface.inspection import InspectionSurface
+from planner.surface.normals import unit
 from planner.surface.patch import pn_normals, pn_points
 from planner.surface.rays import Scene
 from planner.surface.topology import edges_of, weld, weld_tolerance_mm
 from planner.surface.vertex_fit import VertexFit, fit_vertices
 
+# Share of the area whose worst triangle gives the angle error.
+COVERED = 0.9999
 FOOT_STEPS = 6
 FOOT_TOLERANCE_MM = 1e-6
 
@@ -69,12 +72,18 @@ class CurvedSurface:
         """Return points (n, 3) and unit outward normals (n, 3) at barycentrics of faces."""
         corner = self._faces[face]
         points, normals = self.vertex_fit.points[corner], self.vertex_fit.normals[corner]
-        return pn_points(points, normals, bary), pn_normals(points, normals, bary)
+        return pn_points(points, normals, bary), self._blend(points, normals, bary)
 
     def normals(self, face: NDArray, bary: Array) -> Array:
         """Return unit outward normals (n, 3)."""
         corner = self._faces[face]
-        return pn_normals(self.vertex_fit.points[corner], self.vertex_fit.normals[corner], bary)
+        return self._blend(self.vertex_fit.points[corner], self.vertex_fit.normals[corner], bary)
+
+    def _blend(self, corners: Array, normals: Array, bary: Array) -> Array:
+        """Return normals inside triangles; between vertices that scatter, what these say about slopes is only noise."""
+        if self.vertex_fit.exact:
+            return pn_normals(corners, normals, bary)
+        return unit(np.einsum("nk,nkj->nj", bary, normals))
 
     def shape_operator(self, face: NDArray, bary: Array) -> Array:
         """Return symmetric W (n, 3, 3), 1/mm, with dn = W dp for steps along the surface; a sphere has +1/R."""
@@ -176,8 +185,12 @@ class CurvedSurface:
         flat_points = np.einsum("nk,nkj->nj", bary, self._vertices[self._faces[face]])
         gap = np.abs(np.einsum("ij,ij->i", points - flat_points, flat))
         at_corners = self.vertex_fit.normals[self._faces]
-        sine = np.linalg.norm(np.cross(at_corners, self.surface.face_normals[:, None]), axis=2)
-        return float(gap.max(initial=0.0)), float(np.degrees(np.arcsin(np.clip(sine, 0, 1).max(initial=0.0))))
+        sine = np.linalg.norm(np.cross(at_corners, self.surface.face_normals[:, None]), axis=2).max(axis=1)
+        # Slivers have normals of their own; of the triangles that cover nearly all of the area, the worst.
+        order = np.argsort(sine)
+        covered = np.cumsum(self.surface.face_areas_mm2[order])
+        worst = order[min(int(np.searchsorted(covered, COVERED * covered[-1])), len(order) - 1)]
+        return float(gap.max(initial=0.0)), float(np.degrees(np.arcsin(min(1.0, sine[worst]))))
 
     @property
     def chord_error_mm(self) -> float:

@@ -11,6 +11,7 @@ from scipy.sparse.csgraph import connected_components
 from planner.errors import fail
 from planner.frames import Array
 from planner.part import Part
+from planner.surface.facing import facing
 from planner.surface.inspection import InspectionSurface
 from planner.surface.topology import Edges, Index, edges_of, weld, weld_tolerance_mm
 
@@ -43,7 +44,10 @@ def inspection_surface(
     max_turn_deg stops it where the facets have turned by more than that from the seed's (or from up_part).
 
     Triangles that touch within rounding are joined even if the file does not share their vertices; edges of three or
-    more faces are treated as creases. Errors: `seed-off-part` (farther than 2 mm), `seeds-apart` (several regions that do
+    more faces are treated as creases. An open sheet has two sides of one size: the one that faces up_part is meant, and
+    if the file winds it the other way `surface.part` is a copy wound towards up_part (`facing_issues` says so).
+
+    Errors: `seed-off-part` (farther than 2 mm), `seeds-apart` (several regions that do
     not touch), `surface-turn` (nothing within max_turn_deg).
     """
     seeds = None if seeds_part is None else np.asarray(seeds_part, dtype=np.float64).reshape(-1, 3)
@@ -58,8 +62,8 @@ def inspection_surface(
     else:
         chosen = sorted(set(regions.label[start].tolist()))
         _expect_one_piece(part, edges, regions, chosen, seeds)
-    picked = np.flatnonzero(np.isin(regions.label, chosen) & allowed)
-    return InspectionSurface(part, picked.astype(np.int32))
+    picked = np.flatnonzero(np.isin(regions.label, chosen) & allowed).astype(np.int32)
+    return facing(InspectionSurface(part, picked), edges, up)
 
 
 def welded_faces(part: Part) -> Index:
@@ -72,14 +76,33 @@ def dihedral_rad(part: Part, edges: Edges) -> Array:
     """Return the angle between the two faces at every edge (e,), rad, 0 for coplanar; pi where there are not two.
 
     Faces that walk their edge the same way are wound against each other: the angle is then taken with one of them turned.
-    A face without area has no normal; it bends nothing.
+    A sliver has no normal of its own: it counts as part of the face across its longest edge.
     """
     angle = np.full(len(edges.uses), np.pi)
     pair = np.flatnonzero(edges.uses == 2)
-    a, b = part.face_normals[edges.first[pair]], part.face_normals[edges.second[pair]]
+    normals = _normals_without_slivers(part, edges)
+    a, b = normals[edges.first[pair]], normals[edges.second[pair]]
     sine, cosine = np.linalg.norm(np.cross(a, b), axis=1), np.einsum("ij,ij->i", a, b)
     angle[pair] = np.arctan2(sine, np.where(same_winding(edges)[pair], cosine, -cosine))
     return angle
+
+
+def _normals_without_slivers(part: Part, edges: Edges) -> Array:
+    """Return face normals (f, 3); those of triangles thinner than rounding are taken from the face across the longest edge."""
+    ends = part.vertices[part.faces]
+    lengths = np.stack([np.linalg.norm(ends[:, (k + 2) % 3] - ends[:, (k + 1) % 3], axis=1) for k in range(3)], axis=1)
+    longest = lengths.argmax(axis=1)
+    height = 2.0 * part.face_areas_mm2 / np.maximum(lengths.max(axis=1), 1e-30)
+    thin = np.flatnonzero(height < 4.0 * weld_tolerance_mm(part.vertices))
+    if not len(thin):
+        return part.face_normals
+    normals = part.face_normals.copy()
+    edge = edges.of_face[thin, longest[thin]]
+    across = np.where(edges.first[edge] == thin, edges.second[edge], edges.first[edge])
+    across = np.where(edges.uses[edge] == 2, across, thin)
+    for _ in range(3):  # slivers lie against slivers, rarely more than two deep
+        normals[thin] = normals[across]
+    return normals
 
 
 def same_winding(edges: Edges) -> NDArray[np.bool_]:
