@@ -9,13 +9,12 @@ from numpy.typing import NDArray
 from alignment.cloud import PointCloud
 from alignment.metrics.bubbles import bubbles
 from alignment.metrics.expected import Closest
+from alignment.metrics.feet import feet, search
 from alignment.metrics.figures import WITHIN_DB, centre_laws, loss_db, spread, tilts_deg
 from planner.errors import fail
 from planner.frames import Array, Transform
 from planner.issues import Issue
 from planner.setup import Setup
-
-CHUNK = 500_000
 
 
 @dataclass(frozen=True)
@@ -73,14 +72,10 @@ def assess(cloud: PointCloud, curved: Closest, setup: Setup, T_base_part: Transf
             "Give the readings of the scan.",
         )
     to_part = T_base_part.inv()
-    n = len(cloud)
-    feet, expected_mm, expected_db, on_part = np.zeros((n, 3)), np.zeros(n), np.zeros(n), np.zeros(n, dtype=bool)
-    for begin in range(0, n, CHUNK):
-        rows = slice(begin, begin + CHUNK)
-        foot = curved.closest(to_part.points(cloud.origins_base[rows]))
-        beams, arrays = to_part.directions(cloud.beams_base[rows]), to_part.directions(cloud.arrays_base[rows])
-        feet[rows], expected_mm[rows], on_part[rows] = foot.points, foot.distance_mm, foot.interior
-        expected_db[rows] = loss_db(*tilts_deg(beams, arrays, foot.normals), setup.probe)
+    found = feet(cloud, curved, to_part, setup.probe)
+    beams, arrays = to_part.directions(cloud.beams_base), to_part.directions(cloud.arrays_base)
+    expected_db = loss_db(*tilts_deg(beams, arrays, found.normals), setup.probe)
+    on_part = found.interior
     with np.errstate(divide="ignore", invalid="ignore"):
         db = 20.0 * np.log10(cloud.amplitude_pct / setup.reference_amplitude_pct)
     db[~np.isfinite(db)] = np.nan
@@ -88,19 +83,19 @@ def assess(cloud: PointCloud, curved: Closest, setup: Setup, T_base_part: Transf
     bubble = _bubbles(cloud, centre)
     lost_on_part = np.zeros(len(cloud.lost_law), dtype=bool)
     if len(cloud.lost_law):
-        lost_on_part = curved.closest(to_part.points(cloud.lost_origins_base)).interior
+        lost_on_part = search(curved, to_part.points(cloud.lost_origins_base)).interior
     figures, issues = _figures(cloud, setup, on_part, centre, bubble, db, lost_on_part)
     return Assessment(
-        figures,
-        feet,
-        cloud.distance_mm,
-        cloud.distance_mm - expected_mm,
-        db,
-        expected_db,
-        on_part,
-        centre,
-        bubble,
-        issues,
+        figures=figures,
+        feet_part=found.points,
+        distance_mm=cloud.distance_mm,
+        deviation_mm=cloud.distance_mm - found.distance_mm,
+        db=db,
+        expected_db=expected_db,
+        on_part=on_part,
+        centre=centre,
+        bubble=bubble,
+        issues=issues,
     )
 
 

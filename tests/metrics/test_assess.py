@@ -5,6 +5,7 @@ import pytest
 
 from alignment.cloud import PointCloud
 from alignment.metrics import assess, compare
+from alignment.metrics.feet import feet, search
 from alignment.metrics.figures import centre_laws
 from alignment.point_cloud import point_cloud
 from alignment.simulator import Noise, Truth, simulate
@@ -13,7 +14,7 @@ from planner.frames import Transform
 from planner.setup import Probe, Setup
 from planner.surface.curved import CurvedSurface
 from tests.metrics.test_expected import Plane
-from tests.simulator.cells import NO_OFFSET, one_pass, plate
+from tests.simulator.cells import NO_OFFSET, looking_down, one_pass, plate, program, sheet
 
 HERE = Transform.identity("base", "part")
 SINGLE = Setup(probe={"elements": 1}, inspection={"step_mm": 2})
@@ -144,3 +145,29 @@ def test_centre_laws() -> None:
     scan = simulate(part, surface, one_pass([0, 0, 20], [10, 0, 20]), Setup(), Truth(NO_OFFSET), Noise.none())
     result = assess(point_cloud([scan], Setup()), CurvedSurface(surface, 4.5), Setup(), HERE)
     assert result.centre.sum() == 2 * len(scan.Ts_scan_tcp)
+
+
+def test_feet_between_searched_laws_are_those_of_a_search() -> None:
+    def cylinder(u, v):
+        return np.stack([120 * np.sin(u / 120), v, 120 * np.cos(u / 120)], axis=1)
+
+    part, surface = sheet(cylinder, 41, 31, (-60.0, 60.0), (-75.0, 75.0))
+    curved = CurvedSurface(surface, 4.5)
+    # Travel along the axis: the array lies across the curvature, and runs over the rim of the sheet.
+    for x in (0.0, 58.0):
+        tilt = np.arcsin(x / 135)
+        poses = looking_down(
+            np.array([[x, -10, 135 * np.cos(tilt)], [x, 10, 135 * np.cos(tilt)]]), np.array([0.0, 1, 0])
+        )
+        scan = simulate(
+            part, surface, program(poses, [False, True]), Setup(), Truth(NO_OFFSET), Noise(lost_deg=60, floor_db=0)
+        )
+        cloud = point_cloud([scan], Setup())
+        found, exact = feet(cloud, curved, HERE.inv(), Setup().probe), search(curved, cloud.origins_base)
+        np.testing.assert_array_equal(found.interior, exact.interior)
+        inside = exact.interior
+        np.testing.assert_allclose(found.distance_mm[inside], exact.distance_mm[inside], atol=1e-4)
+        np.testing.assert_allclose(found.points[inside], exact.points[inside], atol=5e-3)
+        radius = np.hypot(cloud.origins_base[inside, 0], cloud.origins_base[inside, 2])
+        np.testing.assert_allclose(found.distance_mm[inside], radius - 120, atol=2e-3)
+        assert exact.interior.all() == (x == 0.0)
