@@ -12,6 +12,8 @@ from planner.setup import Setup
 
 # Every so many laws the foot is searched from afar; between them it is searched near the interpolated guess.
 LAW_STRIDE = 8
+# A foot this far aside changes the distance by a millionth of a mm.
+ASIDE_MM = 3e-3
 CLEAR_MM = 1.0
 """What stands this much in front of the inspected face hides it."""
 
@@ -57,20 +59,26 @@ def _feet(body: TrueBody, origins: Array) -> tuple[Array, Array]:
     weight = (place - left)[None, :, None]
     guess = (points[:, left] * (1.0 - weight) + points[:, left + 1] * weight).reshape(-1, 3)
     points, normals = body.face.foot(guess)
+    active = np.arange(len(flat))
     for _ in range(8):
-        offset = flat - points
-        along = offset - np.einsum("ij,ij->i", offset, normals)[:, None] * normals
-        moving = np.flatnonzero(np.einsum("ij,ij->i", along, along) > 1e-6)
-        if len(moving) == 0:
+        along = _along(flat[active], points[active], normals[active])
+        aside = np.einsum("ij,ij->i", along, along) > ASIDE_MM**2
+        active, along = active[aside], along[aside]
+        if len(active) == 0:
             return points, normals
-        moved = body.face.foot(points[moving] + along[moving])
-        still = np.linalg.norm(moved[0] - points[moving], axis=1) < 1e-4
-        points[moving], normals[moving] = moved
-        if still.all():
-            return points, normals
-    slow = np.flatnonzero(np.einsum("ij,ij->i", along, along) > 1e-6)
-    points[slow], normals[slow] = body.face.foot(flat[slow])
+        moved, turned = body.face.foot(points[active] + along)
+        # On the rim the foot stays beside the normal however often it is searched.
+        still = np.linalg.norm(moved - points[active], axis=1) < 0.1 * ASIDE_MM
+        points[active], normals[active] = moved, turned
+        active = active[~still]
+    points[active], normals[active] = body.face.foot(flat[active])
     return points, normals
+
+
+def _along(origins: Array, points: Array, normals: Array) -> Array:
+    """The part of origin - point that runs along the surface (n, 3), mm: nothing at the foot."""
+    offset = origins - points
+    return np.asarray(offset - np.einsum("ij,ij->i", offset, normals)[:, None] * normals)
 
 
 def _of_face(
