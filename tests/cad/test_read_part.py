@@ -11,6 +11,7 @@ import trimesh
 from planner.cad import load_part, read_part, save_part
 from planner.cad.step import complaint, file_unit
 from planner.errors import EchoBaseError
+from planner.surface.select import inspection_surface
 from sample_parts.make_samples import aerofoil_point, aerofoil_uv
 
 SAMPLES = Path(__file__).parents[2] / "sample_parts"
@@ -74,9 +75,12 @@ def test_step_plate_and_aerofoil_are_their_true_surfaces():
     assert plate.provenance.unit == "mm"
     assert volume(plate) == pytest.approx(150e3, rel=1e-6)
     skin = read_part(SAMPLES / "aerofoil" / "aerofoil.step", "aerofoil.step", "mm")
-    u, v = aerofoil_uv(skin.vertices[:, 0], skin.vertices[:, 1])
-    height = skin.vertices[:, 2] - aerofoil_point(u, v)[:, 2]
-    assert np.minimum(np.abs(height), np.abs(height + 4.0)).max() < 2e-4
+    outer = inspection_surface(skin)
+    u, v = aerofoil_uv(outer.vertices[:, 0], outer.vertices[:, 1])
+    assert np.abs(outer.vertices - aerofoil_point(u, v)).max() < 2e-4
+    assert (outer.mean_normal_part[2], outer.area_mm2) == pytest.approx((0.997, 531_566.0), rel=1e-4)
+    stl = read_part(SAMPLES / "aerofoil" / "aerofoil.stl", "aerofoil.stl", "mm")
+    assert inspection_surface(stl).area_mm2 == pytest.approx(outer.area_mm2, rel=1e-5)
     assert skin.chord_error_mm < 0.011
     assert skin.meta["bodies"] == skin.meta["closed_bodies"] == 1
 
