@@ -6,7 +6,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from kuka_export.language.follow import Followed, Follower
-from kuka_export.language.library import Library, load
+from kuka_export.language.library import Library, load, uncollected
 from planner.errors import EchoBaseError, fail
 from planner.frames import Array, Transform
 from planner.issues import Issue
@@ -103,7 +103,8 @@ def read_library(library: Library, data_output: int | None = None) -> KrlReading
     home_first = False
     for k, (source, routine) in enumerate(roots):
         first_rows.append(len(follower.out.axis_moves))
-        follower.run(source, routine)
+        with uncollected():
+            follower.run(source, routine)
         if k == 0:
             out = follower.out
             home_first = bool(out.homes) and out.homes[0] == 0
