@@ -11,7 +11,7 @@ from alignment.estimate.capture import Captured
 from alignment.estimate.diagnose import diagnose_fit, diagnose_lost, floor_issues, temperature_issue
 from alignment.estimate.directions import directions, named_statuses
 from alignment.estimate.keypoint_method import KeyPointFit, KeyPointMatch, align_keypoints, match_keypoints
-from alignment.estimate.map import MapFit, align_map, condense_cloud
+from alignment.estimate.map import align_map, condense_cloud
 from alignment.estimate.motion import motion_rows, named_axes
 from alignment.estimate.patches import Patches
 from alignment.estimate.problem import Problem

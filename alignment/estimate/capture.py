@@ -22,11 +22,14 @@ LEAST_VALID = 12
 
 @dataclass(frozen=True, eq=False)
 class Captured:
-    """The placement found, whether the steps died out, and the robust scatter (mm) and share of readings on the surface."""
+    """The placement found, and whether the steps died out.
+
+    scatter_mm: robust scatter of the sample. valid_share, inlier_share: of it that meets the surface, and that agrees.
+    """
 
     T_base_part: Transform
     converged: bool
-    sigma_mm: float
+    scatter_mm: float
     valid_share: float
     inlier_share: float
 
@@ -54,7 +57,7 @@ def capture(cloud: PointCloud, problem: Problem, start: Transform | None = None,
     beams = None if cloud.beams_base is None else cloud.beams_base[rows]
     heard = reading_weights(cloud)[rows]
     T = problem.T_base_nominal if start is None else start
-    sigma, valid_share, inlier_share, converged = np.inf, 0.0, 0.0, False
+    scatter, valid_share, inlier_share, converged = np.inf, 0.0, 0.0, False
     for i in range(STEPS):
         found = distance_rows(problem.curved, T, problem.centre_mm(T), origins, distance, beams)
         use = found.valid & (heard > 0)
@@ -62,7 +65,8 @@ def capture(cloud: PointCloud, problem: Problem, start: Transform | None = None,
         if use.sum() < LEAST_VALID:
             break
         r, x = found.r[use], found.jacobian[use] * problem.prior_sigma
-        sigma = mad_sigma(r, FLOOR_MM, about_zero=True)
+        scatter = mad_sigma(r, 1e-3, about_zero=True)
+        sigma = max(scatter, FLOOR_MM)
         robust = huber_weights(r, sigma) if i < CONVEX_STEPS else tukey_weights(r, sigma)
         inlier_share = float((np.abs(r) < 4.0 * sigma).mean())
         weight = heard[use] * robust / READING_SIGMA_MM**2
@@ -72,4 +76,4 @@ def capture(cloud: PointCloud, problem: Problem, start: Transform | None = None,
         if i >= CONVEX_STEPS and problem.moves_mm(z) < 0.2 * FLOOR_MM:
             converged = True
             break
-    return Captured(T, converged, float(sigma), valid_share, inlier_share)
+    return Captured(T, converged, float(scatter), valid_share, inlier_share)

@@ -1,27 +1,173 @@
-"""Wrong inputs, recognised and named: what else could have produced this scan?"""
+"""Wrong inputs, recognised and named; and what limits a result that is right."""
 
 import numpy as np
 
 from alignment.cloud import PointCloud
-from alignment.estimate.capture import Captured
+from alignment.estimate.capture import Captured, capture
+from alignment.estimate.hypotheses import Hypothesis, array_hypotheses, place_hypotheses, thinned
+from alignment.estimate.map import MapFit
 from alignment.estimate.problem import Problem
+from alignment.estimate.robust import mad_sigma
+from planner.couplant import sound_speed_m_s, water_speed_m_s
 from planner.issues import Issue
 from planner.setup import Setup
 
+SAMPLE = 1200
+# A reading of the scan fits if this share of it is on the surface, and agrees with it to this (mm, robust).
+FITS_SHARE = 0.6
+FITS_MM = 0.4
+# Another explanation has to be this much better than the given one.
+BETTER = 0.5
+# Of a scan that fits far from nominal, one that fits nearly as well and near is the likelier.
+NEARLY = 2.5
+# A fit with this robust scatter (mm) is suspicious, and so is one with so few readings on the surface.
+SUSPICIOUS_MM = 0.3
+SUSPICIOUS_SHARE = 0.5
+# Change of the speed of sound that is worth a word: two degrees of water.
+SPEED_SHARE = 0.004
+# Standoffs that differ by less than this, beyond what a misplaced part makes of one, tell nothing about it (mm rms).
+LEAST_STANDOFF_SPREAD_MM = 1.0
+CHORD_MM, CHORD_DEG = 0.01, 0.1
+
+
+def diagnose_lost(cloud: PointCloud, problem: Problem, captured: Captured) -> list[Issue]:
+    """Return why nothing could be estimated."""
+    found = _best(cloud, problem, np.inf, [*place_hypotheses(problem.setup), *array_hypotheses(problem.setup)])
+    if found is not None:
+        return [Issue("error", found.code, found.message, found.remedy, "scan")]
+    share = captured.valid_share
+    return [
+        Issue(
+            "error",
+            "scan-not-on-part",
+            f"the scan does not fit the inspection surface: {share:.0%} of its readings meet it, and no fit settles.",
+            "Check that this is a scan of this part, in the BASE it was planned in, and with the same setup.",
+            "scan",
+        )
+    ]
+
+
+def diagnose_fit(cloud: PointCloud, problem: Problem, found: MapFit) -> list[Issue]:
+    """Return what another reading of the scan would explain better, and what else is odd about a fit."""
+    r = found.rows.r[found.used]
+    sigma = mad_sigma(r, 1e-3, about_zero=True)
+    share = found.captured.valid_share
+    issues: list[Issue] = []
+    hypotheses = list(array_hypotheses(problem.setup))
+    lost = sigma > SUSPICIOUS_MM or share < SUSPICIOUS_SHARE
+    if lost or _beyond_limits(found, problem):
+        hypotheses += place_hypotheses(problem.setup)
+    better = _best(cloud, problem, max(sigma, _own_scatter(cloud, problem)), hypotheses, _beyond_limits(found, problem))
+    if better is not None:
+        issues.append(Issue("error", better.code, better.message, better.remedy, "scan"))
+    valid = int(found.rows.valid.sum())
+    kept = int(found.used.sum())
+    if valid and kept < 0.6 * valid:
+        issues.append(
+            Issue(
+                "error",
+                "scan-of-another-part",
+                f"only {kept} of {valid} patches of the scan agree with the part's surface.",
+                "Check that this is a scan of this part.",
+                "scan",
+            )
+        )
+    return issues + speed_issues(found, problem)
+
+
+def _beyond_limits(found: MapFit, problem: Problem) -> bool:
+    total = np.abs(problem.total(found.T_base_part))
+    return bool(total.max() > 3.0)
+
+
+def _own_scatter(cloud: PointCloud, problem: Problem) -> float:
+    """Return the scatter (mm) of a sample about the given reading of the scan, judged as the others are."""
+    found = capture(thinned(cloud, SAMPLE), problem)
+    return found.scatter_mm if found.converged else np.inf
+
+
+def _best(
+    cloud: PointCloud, problem: Problem, scatter_mm: float, hypotheses: list[Hypothesis], far: bool = False
+) -> Hypothesis | None:
+    """Return the hypothesis that fits best, if it fits well and clearly better than the scan as given.
+
+    far: the scan as given fits, but far from nominal; then one that fits as well and near counts too.
+    """
+    small = thinned(cloud, SAMPLE)
+    best, chosen = np.inf, None
+    for hypothesis in hypotheses:
+        found = capture(hypothesis.apply(small), problem)
+        if not found.converged or found.valid_share < FITS_SHARE or found.scatter_mm > FITS_MM:
+            continue
+        near = far and float(np.abs(problem.total(found.T_base_part)).max()) < 2.0
+        wanted = NEARLY * scatter_mm if near else BETTER * scatter_mm
+        if found.scatter_mm < min(best, wanted):
+            best, chosen = found.scatter_mm, hypothesis
+    return chosen
+
+
+def speed_issues(found: MapFit, problem: Problem) -> list[Issue]:
+    """Return a warning where two standoffs show that the speed of sound is not the one believed.
+
+    A wrong speed scales every distance. On one standoff that is a shift along the beam; on two it is not.
+    """
+    if problem.setup.alignment.point_model != "perpendicular" or not found.used.any():
+        return []
+    patches, used = found.patches, found.used
+    d, design = patches.distance_mm[used], found.rows.jacobian[used] * problem.prior_sigma
+    apart = d - design @ np.linalg.lstsq(design, d, rcond=None)[0]
+    if float(apart.std()) < LEAST_STANDOFF_SPREAD_MM:
+        return []
+    x, r = np.column_stack([design, d]), found.rows.r[used]
+    # Neighbouring patches share the robot's error: as many count as one as there are in its correlation length, both ways.
+    shared = max(5.0, 8.0 * found.noise.named()["path_length_mm"] / 8.0)
+    variance = shared * mad_sigma(r, 0.01, about_zero=True) ** 2
+    information = x.T @ x / variance + np.diag(np.r_[np.ones(6), 1e-6])
+    scale = -np.linalg.solve(information, x.T @ r / variance)[6]
+    deviation = float(np.sqrt(np.linalg.inv(information)[6, 6]))
+    if abs(scale) < max(SPEED_SHARE, 4.0 * deviation):
+        return []
+    speed = sound_speed_m_s(problem.setup.couplant) * (1.0 + scale)
+    return [
+        Issue(
+            "warning",
+            "sound-speed-wrong",
+            f"distances at different standoffs fit a speed of sound of {speed:.0f} m/s, not "
+            f"{sound_speed_m_s(problem.setup.couplant):.0f} m/s.",
+            "Measure the temperature of the couplant, or set couplant.sound_speed_m_s.",
+            "setup.json: couplant",
+        )
+    ]
+
 
 def temperature_issue(setup: Setup) -> list[Issue]:
-    """Return what a wrong water temperature would do to Z."""
-    return []
+    """Return what the couplant's temperature is worth along the beam: a scan at one standoff cannot tell."""
+    couplant, standoff = setup.couplant, setup.alignment_standoff_mm
+    if couplant.sound_speed_m_s is not None:
+        per = standoff / couplant.sound_speed_m_s
+        text = f"Z rests on the speed of sound given: 1 m/s is {per:.4f} mm at {standoff:g} mm standoff."
+    else:
+        t = couplant.temperature_c
+        slope = (water_speed_m_s(t + 0.5) - water_speed_m_s(t - 0.5)) / water_speed_m_s(t)
+        text = (
+            f"Z rests on the couplant's temperature of {t:g} deg C: 1 deg C is {slope * standoff:.3f} mm at "
+            f"{standoff:g} mm standoff."
+        )
+    return [Issue("info", "couplant-temperature", text, "Measure it at the nozzle.", "setup.json: couplant")]
 
 
 def floor_issues(problem: Problem) -> list[Issue]:
     """Return where the tessellation, not the scan, limits the result."""
-    return []
-
-
-def diagnose_fit(cloud: PointCloud, problem: Problem, found) -> list[Issue]:
-    return []
-
-
-def diagnose_lost(cloud: PointCloud, problem: Problem, captured: Captured) -> list[Issue]:
-    return [Issue("error", "scan-not-on-part", "the scan does not fit the part.", "Check part, base and units.")]
+    chord, angle = problem.curved.chord_error_mm, problem.curved.chord_angle_deg
+    if chord <= CHORD_MM and angle <= CHORD_DEG:
+        return []
+    return [
+        Issue(
+            "info",
+            "tessellation-coarse",
+            f"the CAD's triangles stand up to {chord:.3f} mm and {angle:.2f} deg off the smooth surface that was fitted "
+            "to them; no accuracy below what that fit recovers can be claimed.",
+            "Export the CAD with a finer tessellation if this matters.",
+            "part",
+        )
+    ]

@@ -78,8 +78,7 @@ def directions(
     out = []
     lock = _row_space(locked)
     for basis, is_lock in ((lock, True), (_simple(_without(held, lock)), False)):
-        for u in basis.T:
-            out.append(_direction("held", 1.0, u * prior_sigma, moments_base, is_lock))
+        out += [_direction("held", 1.0, u * prior_sigma, moments_base, is_lock) for u in basis.T]
     free = complement(held, 6)
     value, vector = np.linalg.eigh(free.T @ covariance @ free)
     for lam, v in zip(value[::-1], vector.T[::-1], strict=True):
@@ -119,7 +118,7 @@ def _simple(basis: Array) -> Array:
     turn = np.eye(h)
     for _ in range(200):
         b = basis @ turn
-        u, s, vt = np.linalg.svd(basis.T @ (b**3 - b * (b**2).mean(axis=0)))
+        u, _, vt = np.linalg.svd(basis.T @ (b**3 - b * (b**2).mean(axis=0)))
         new = u @ vt
         if np.abs(new - turn).max() < 1e-12:
             break

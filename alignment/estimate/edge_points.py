@@ -4,7 +4,7 @@ Half the amplitude (-6 dB) means half of the beam on the part, so its middle sta
 the place is found on the beam's own S-curve, which the scan itself shows, not on a chord.
 """
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, fields, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -51,6 +51,10 @@ class EdgePoints:
 
     def __len__(self) -> int:
         return len(self.at)
+
+    def take(self, rows: NDArray[np.bool_]) -> "EdgePoints":
+        """Return the crossings picked."""
+        return EdgePoints(*(getattr(self, f.name)[rows] for f in fields(self)))
 
     @property
     def gap_mm(self) -> Array:
@@ -99,7 +103,19 @@ def edge_points(cloud: PointCloud, line: PoseLine, probe: Probe) -> EdgePoints:
         line.s_mm[pose].mean(axis=1),
         law.mean(axis=1),
     )
-    return locate(found, np.ones(len(found)), probe.beam_width_mm)
+    clear = found.take(_clear(found.window))
+    return locate(clear, np.ones(len(clear)), probe.beam_width_mm)
+
+
+def _clear(window: Array) -> NDArray[np.bool_]:
+    """Return which crossings are edges: on the part for all readings before, off it for all behind, two at least each.
+
+    A lost echo or a splash comes and goes; beyond an edge there is nothing.
+    """
+    on, off = window[:, :4], window[:, 4:]
+    known_on, known_off = np.isfinite(on).sum(axis=1), np.isfinite(off).sum(axis=1)
+    stays = ((on > 0.5) | np.isnan(on)).all(axis=1) & ((off < 0.5) | np.isnan(off)).all(axis=1)
+    return stays & (known_on >= 3) & (known_off >= 2)
 
 
 def _shares(cloud: PointCloud, line: PoseLine, probe: Probe) -> Array | None:

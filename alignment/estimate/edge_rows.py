@@ -23,7 +23,9 @@ CAPTURE_MM = 13.0
 @dataclass(frozen=True, eq=False)
 class EdgeRows:
     """r (k,): the edge's distance beyond the crossing, mm, in the surface and across the edge. jacobian (k, 6): dr / dxi.
-    lag (k,): share of the travel across the edge. cosine (k,): of the step across it. valid (k,). point_base (k, 3): on the placed edge. segment (k,).
+
+    lag (k,): share of the travel across the edge. cosine (k,): of the step across it. valid (k,).
+    point_base (k, 3): on the placed edge. segment (k,).
     """
 
     r: Array
