@@ -42,7 +42,9 @@ def path_clearance(solid: Solid, path: ToolPath, envelope: Envelope, keep_mm: fl
     for _ in range(MAX_HALVINGS):
         moved = _motion_mm(step.start, step.end, envelope)
         doubtful = np.minimum(step.low, step.high) - moved / 2.0 - bulge[step.index] < keep_mm
-        step = step.take(doubtful & (moved > SHORTEST_STEP_MM))
+        # A step that is known to touch needs no closer look.
+        known = np.minimum(nozzle, wrist)[step.index] < 0.0
+        step = step.take(doubtful & (moved > SHORTEST_STEP_MM) & ~known)
         if len(step.index) == 0:
             break
         middle = _halfway(step.start, step.end)

@@ -11,7 +11,7 @@ from planner.robot.kinematics import inverse
 from planner.robot.model import Robot
 from planner.robot.reach import reach
 
-SAMPLE_POSES = 60
+SAMPLE_POSES = 30
 # Poses of the path, in order, on which the best places are tried for good, one configuration throughout.
 TRIAL_POSES = 2000
 TRIALS = 8
