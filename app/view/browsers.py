@@ -7,6 +7,7 @@ import viser
 
 from app.view.layers import LAYERS, layers_of
 from app.view.loopback import place_for, show_for
+from planner.frames import Array
 from planner.toolpath import PathKind
 
 
@@ -22,6 +23,8 @@ class Browser:
     probe_pose: tuple[tuple[float, ...], tuple[float, ...]] | None = None
     moved: bool = False
     """True once somebody chose a camera or the first picture was framed."""
+    framed: tuple[str, Array, tuple[int, int]] | None = None
+    """Standard view last framed: its name, the camera's place (m), the size of the picture (px)."""
 
     def apply(self) -> None:
         """Send which layers this browser shows."""

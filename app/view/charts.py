@@ -37,12 +37,16 @@ def deviation_chart(model: ProjectModel) -> dict[str, Any]:
     nominal = assume_nominal(model.setup().T_base_partnom)
     poses = {"before": nominal} | ({"after": found.T_base_part} if found else {})
     measured = {name: deviation(cloud, surface, pose).values_mm for name, pose in poses.items()}
-    limit = symmetric_limit(np.concatenate(list(measured.values())))
     return {
         "title": "Deviation along the normal",
         "unit": "mm",
-        "series": {name: histogram(values, -limit, limit) for name, values in measured.items()},
+        "series": {name: _about_zero(values) for name, values in measured.items()},
     }
+
+
+def _about_zero(values: Array) -> dict[str, Any]:
+    limit = symmetric_limit(values)
+    return histogram(values, -limit, limit)
 
 
 def amplitude_chart(model: ProjectModel) -> dict[str, Any]:

@@ -24,6 +24,8 @@ class Legend:
     low: float
     high: float
     colours: list[str] = field(default_factory=list)
+    unknown: str | None = None
+    """Colour of what was not measured, where that is drawn."""
 
 
 def draw_scan(server: viser.ViserServer, cloud: PointCloud, by: str, standoff_mm: float, size_mm: float) -> Legend:
@@ -63,4 +65,5 @@ def draw_deviation(
         receive_shadow=False,
     )
     title = "Deviation before" if layer == "before" else "Deviation after"
-    return Legend(title, "mm", -limit_mm, limit_mm, colour.legend_colours("diverging", mapped=True))
+    grey = colour.hex_of(colour.on_screen(np.array([colour.UNKNOWN], dtype=np.uint8)))[0]
+    return Legend(title, "mm", -limit_mm, limit_mm, colour.legend_colours("diverging", mapped=True), grey)

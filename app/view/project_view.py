@@ -167,7 +167,8 @@ class ProjectView:
         if points is None:
             return
         camera = browser.client.camera
-        aspect = float(camera.aspect) if camera.aspect else 1.5
+        size = (int(camera.image_width), int(camera.image_height))
+        aspect = size[0] / max(size[1], 1)
         surface = self.model.surface()
         if view == "surface" and surface is not None:
             T = assume_nominal(self.model.setup().T_base_partnom)
@@ -183,6 +184,7 @@ class ProjectView:
             )
         else:
             self._move(browser, sight("iso" if view == "surface" else view, points, FOV_RAD, aspect))
+        browser.framed = (view, np.asarray(camera.position).copy(), size)
 
     def _focus(self, browser: Browser, name: str) -> None:
         found = next((p for p in self.model.keypoints().points if p.id == name), None)
@@ -209,6 +211,16 @@ class ProjectView:
         # The page reads its number from the title of viser's own (hidden) panel.
         client.gui.set_panel_label(f"echobase-view-{client.client_id}")
         browser.apply()
+
+        @client.camera.on_update
+        async def _(camera: viser.CameraHandle) -> None:
+            # A picture that nobody moved keeps holding the whole part when its frame changes.
+            if browser.framed is None:
+                return
+            view, place, size = browser.framed
+            now = (int(camera.image_width), int(camera.image_height))
+            if now != size and np.allclose(camera.position, place, atol=1e-4 * self.stage.size_mm):
+                self._look(browser, view)
 
         async def settle() -> None:
             # The shared scene and this browser's own messages travel in separate streams, without a common order.

@@ -58,6 +58,7 @@ export class Shell {
     this.view.say(null);
     this.view.send({ step, pick: this.inspector.pick ?? "none" }).catch(() => {});
     this.content.scrollTop = 0;
+    this.inspector.enter?.(this);
     this.draw();
   }
 
@@ -68,6 +69,7 @@ export class Shell {
     if (what === "view") { this.view.refresh().catch(() => {}); return; }
     if (what === "jobs") { this.drawTopBar(); if (!this.inspector.watchesJobs) return; }
     if (what === "people") { this.drawTopBar(); return; }
+    if (what === "data" && !this.entered) { this.entered = true; this.inspector.enter?.(this); }
     this.draw();
   }
 

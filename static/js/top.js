@@ -1,10 +1,23 @@
 // The top bar: whose project, which part, who looks, what runs.
 
 import { del } from "./api.js";
+import { askText } from "./dialog.js";
 import { button, fill, h } from "./dom.js";
 import { sizes } from "./format.js";
 
 const KINDS = { plan: "Planning", suggest: "Choosing key points", simulate: "Rehearsing", alignment: "Aligning", assessment: "Assessing" };
+
+/** Who looks at this project. */
+function who(people) {
+  const names = (people.names ?? []).join(", ");
+  return people.clients > 1 ? `${people.clients} views open${names ? `: ${names}` : ""}` : names || "connected";
+}
+
+/** Ask for a name; it travels as a cookie, so that the others see who picks. */
+async function name() {
+  const given = await askText("Your name", "Shown to those who look at the same project", /echobase-name=([^;]*)/.exec(document.cookie)?.[1] ?? "", "Save");
+  if (given) document.cookie = `echobase-name=${given.replace(/[^\x20-\x7e]|[;,"\\]/g, "")}; path=/; max-age=31536000; SameSite=Strict`;
+}
 
 /** Draw the top bar. */
 export function drawTop(node, project, rename) {
@@ -20,6 +33,6 @@ export function drawTop(node, project, rename) {
       h("progress", { value: job.fraction ?? 0, max: 1, "aria-label": KINDS[job.kind] ?? "job" }),
       button("Cancel", () => del(`/jobs/${job.id}`).catch(() => {}), { class: "tiny ghost", key: `cancel-${job.id}` })))),
     project.online
-      ? h("span", { class: "people", title: (people.names ?? []).join(", ") }, people.clients > 1 ? `${people.clients} views open` : "connected")
+      ? h("button", { type: "button", class: "btn ghost people", title: "Your name, for the others", onclick: name, data: { key: "people" } }, who(people))
       : h("span", { class: "people off", role: "alert" }, "no connection, trying again"));
 }

@@ -97,7 +97,8 @@ export class View {
     const places = legend.high - legend.low < 5 ? 2 : 0;
     fill(this.legend, h("div", { class: "row", style: { justifyContent: "space-between" } }, h("span", { class: "small" }, legend.title), h("span", { class: "unit" }, legend.unit)),
       h("div", { class: "map" }, legend.colours.map((c) => h("i", { style: { background: c } }))),
-      h("div", { class: "ends num" }, [legend.low, (legend.low + legend.high) / 2, legend.high].map((v) => h("span", {}, fixed(v, places)))));
+      h("div", { class: "ends num" }, [legend.low, (legend.low + legend.high) / 2, legend.high].map((v) => h("span", {}, fixed(v, places)))),
+      legend.unknown && h("div", { class: "row tight small soft" }, h("i", { class: "swatch", style: { background: legend.unknown } }), "not measured"));
   }
 
   /** A sentence over the view, or nothing. */

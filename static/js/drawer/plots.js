@@ -17,7 +17,7 @@ function plotly() {
 const css = (name) => getComputedStyle(document.documentElement).getPropertyValue(name).trim();
 const axis = (title, more = {}) => ({ title: { text: title, font: { size: 11 } }, zeroline: false, gridcolor: "#e7eaed", linecolor: "#c3c9ce", tickfont: { size: 11 }, ...more });
 const layout = (title, x, y, more = {}) => ({
-  title: { text: title, font: { size: 12 }, x: 0.02, xanchor: "left", y: 0.97 }, margin: { l: 48, r: 14, t: 30, b: 36 }, showlegend: false,
+  title: { text: title, font: { size: 12 }, x: 0.02, xanchor: "left", y: 0.99, yanchor: "top", pad: { t: 6 } }, margin: { l: 48, r: 14, t: 30, b: 38 }, showlegend: false,
   font: { family: css("--font"), color: css("--ink-2"), size: 11 }, paper_bgcolor: "rgba(0,0,0,0)", plot_bgcolor: "rgba(0,0,0,0)", xaxis: x, yaxis: y, bargap: 0.04, ...more,
 });
 const config = { displaylogo: false, displayModeBar: false, responsive: true };
@@ -41,7 +41,7 @@ export function histograms(body, alive, ...charts) {
     const shapes = chart.tolerance ? [-1, 1].map((k) => ({ type: "line", x0: k * chart.tolerance, x1: k * chart.tolerance, y0: 0, y1: 1, yref: "paper", line: { color: css("--ink-3"), width: 1, dash: "dot" } })) : [];
     return {
       traces: [{ type: "bar", x: middle, y: s.counts, marker: { color: name === "before" ? "#9aa5af" : css("--accent") }, hovertemplate: `%{x:.3f} ${chart.unit}: %{y}<extra></extra>` }],
-      layout: layout(`${chart.title}, ${TITLES[name] ?? name}<br><span style="font-size:11px">${numbers}</span>`, axis(chart.unit), axis("readings"), { shapes, margin: { l: 48, r: 14, t: 44, b: 36 } }),
+      layout: layout(`${chart.title}, ${TITLES[name] ?? name}<br><span style="font-size:11px">${numbers}</span>`, axis(chart.unit), axis("readings"), { shapes, margin: { l: 48, r: 14, t: 48, b: 38 } }),
     };
   })));
 }

@@ -39,17 +39,23 @@ export function directions(body, list) {
   ], list));
 }
 
-/** Key points as they are planned. */
-export function planned(body, keypoints, issues, focus) {
+/** Key points as they are planned: a click looks at one, a cross deletes it. */
+export function planned(body, keypoints, insight, focus, remove) {
   if (!keypoints?.length) return fill(body, h("p", { class: "nothing" }, "No key points yet. Click on the tinted surface, or let EchoBase suggest some."));
   const worst = (id) => {
-    const mine = issues.filter((i) => i.where === id);
+    const mine = (insight?.issues ?? []).filter((i) => i.where === id);
     return mine.find((i) => i.severity === "error") ?? mine.find((i) => i.severity === "warning");
   };
+  const verdict = (k) => {
+    const w = worst(k.id);
+    if (w) return tag(w.severity === "error" ? "bad" : "warn", w.severity === "error" ? "unusable" : "doubtful");
+    return insight ? tag("good", "usable") : "";
+  };
   return fill(body, table([
-    { title: "Key point", text: true, cell: (k) => k.id },
-    { title: "", text: true, cell: (k) => { const w = worst(k.id); return w ? tag(w.severity === "error" ? "bad" : "warn", w.severity === "error" ? "unusable" : "doubtful") : tag("good", "usable"); } },
+    { title: "Key point", text: true, cell: (k) => h("button", { type: "button", class: "btn ghost tiny", title: "Look at it", onclick: () => focus(k.id) }, k.id) },
+    { title: "", text: true, cell: verdict },
     { title: "X, mm", cell: (k) => mm(k.x_mm) }, { title: "Y, mm", cell: (k) => mm(k.y_mm) }, { title: "Z, mm", cell: (k) => mm(k.z_mm) },
     { title: "Why", text: true, cell: (k) => worst(k.id)?.message ?? "" },
-  ], keypoints, (k) => focus(k.id)));
+    { title: "", cell: (k) => h("button", { type: "button", class: "btn ghost tiny", "aria-label": `Delete ${k.id}`, onclick: () => remove(k.id) }, "✕") },
+  ], keypoints));
 }

@@ -20,7 +20,7 @@ export function content(shell) {
   const [word, text] = WORDS[a.verdict] ?? [a.verdict, ""];
   return [
     a.stale ? verdict("warn", "Out of date", `Changed since: ${a.stale_because.join(", ")}.`) : a.accepted ? verdict("good", "Accepted", `By ${a.accepted.name}: ${a.accepted.reason}`) : verdict(toneOf(a.verdict), word, text),
-    correction(a, setup, shell.local.truth),
+    correction(a, setup, hidden(shell)),
     layers(shell, local),
     before(a),
     facts([["Residual, rms", mm(a.residual?.rms_mm), "mm"], ["Residual, 95 %", mm(a.residual?.p95_mm), "mm"], ["Readings used", whole(a.residual?.readings)], ["Method", h("span", {}, a.method === "map" ? "MAP, all readings" : "key points (paper)")]]),
@@ -29,19 +29,25 @@ export function content(shell) {
   ];
 }
 
+/** The offset that the rehearsed scan was made with, if it was one. */
+function hidden(shell) {
+  const scan = shell.project.data.scans?.filter((s) => s.path === "alignment").at(-1);
+  return scan?.origin === "simulated" ? (scan.detail?.options?.offset ?? null) : null;
+}
+
 function correction(a, setup, truth) {
   const rows = AXES.map((axis) => {
     const key = poseKey(axis);
     const d = a.dof?.[axis] ?? {};
     const unit = isAngle(axis) ? "deg" : "mm";
     return h("tr", {}, h("td", {}, `${axis.toUpperCase()} `, h("span", { class: "unit" }, unit)),
-      h("td", { class: "num" }, h("b", {}, signed(a.correction[key], isAngle(axis) ? 4 : 3))), h("td", { class: "num soft" }, `± ${ofAxis(axis, d.sigma)}`), h("td", { class: "l" }, d.status && tag(toneOf(d.status), d.status)));
+      h("td", { class: "num" }, h("b", {}, signed(a.correction[key], isAngle(axis) ? 4 : 3))), h("td", { class: "num soft" }, `± ${ofAxis(axis, d.sigma)}`), h("td", { class: "l" }, d.status && tag(toneOf(d.status), d.status)),
+      truth && h("td", { class: "num soft", title: "The hidden offset of the rehearsal" }, signed(truth[key], isAngle(axis) ? 4 : 3)));
   });
-  const bases = AXES.map((axis) => h("tr", {}, h("td", {}, axis.toUpperCase()), h("td", { class: "num soft" }, ofAxis(axis, setup.base[poseKey(axis)])), h("td", { class: "num" }, ofAxis(axis, a.base[poseKey(axis)])),
-    truth && h("td", { class: "num soft" }, ofAxis(axis, truth[poseKey(axis)]))));
+  const bases = AXES.map((axis) => h("tr", {}, h("td", {}, axis.toUpperCase()), h("td", { class: "num soft" }, ofAxis(axis, setup.base[poseKey(axis)])), h("td", { class: "num" }, ofAxis(axis, a.base[poseKey(axis)]))));
   return [
-    h("div", {}, h("h3", {}, "Correction of BASE, one sigma"), h("table", { class: "correction" }, h("tbody", {}, rows))),
-    h("div", {}, h("h3", {}, `BASE_DATA[${a.base.number}]`), h("table", {}, h("thead", {}, h("tr", {}, ["", "nominal", "corrected", truth && "rehearsed offset"].filter((t) => t !== undefined && t !== null).map((t) => h("th", {}, t)))), h("tbody", {}, bases))),
+    h("div", {}, h("h3", {}, "Correction of BASE, one sigma"), h("table", { class: "correction" }, truth && h("thead", {}, h("tr", {}, ["", "found", "", "", "hidden"].map((t) => h("th", {}, t)))), h("tbody", {}, rows))),
+    h("div", {}, h("h3", {}, `BASE_DATA[${a.base.number}]`), h("table", {}, h("thead", {}, h("tr", {}, ["", "nominal", "corrected"].map((t) => h("th", {}, t)))), h("tbody", {}, bases))),
   ];
 }
 

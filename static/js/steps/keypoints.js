@@ -26,7 +26,6 @@ export function content(shell) {
       button(picking ? "Picking: on" : "Picking: off", () => shell.view.send({ pick: picking ? "none" : "keypoints" }), { class: picking ? "on" : "", "aria-pressed": String(picking), key: "picking" }),
       button("Undo", () => step(shell, "undo"), { disabled: !view?.undo, title: "Ctrl+Z" }), button("Redo", () => step(shell, "redo"), { disabled: !view?.redo, title: "Ctrl+Shift+Z" }),
       button("Clear", () => shell.do(() => shell.view.send({ clear: true })), { disabled: !n })),
-    n > 0 && list(shell, keypoints, fresh),
     fresh?.issues?.some((i) => !keypoints.some((k) => k.id === i.where)) && h("div", { class: "stack" }, fresh.issues.filter((i) => !keypoints.some((k) => k.id === i.where)).map((i) => h("p", { class: "small soft" }, i.message))),
   ];
 }
@@ -59,17 +58,6 @@ function accuracy(insight, n) {
       Object.keys(sigma).length > 0 && AXES.map((a) => [h("dt", {}, a.toUpperCase(), " ", insight.status?.[a] && tag(toneOf(insight.status[a]), insight.status[a])), h("dd", {}, num(isAngle(a) ? deg(sigma[a]) : mm(sigma[a]), isAngle(a) ? "deg" : "mm"))])));
 }
 
-function list(shell, keypoints, insight) {
-  const worst = (id) => (insight?.issues ?? []).filter((i) => i.where === id && i.severity !== "info").sort((a) => (a.severity === "error" ? -1 : 1))[0];
-  return h("div", { class: "stack" }, h("h3", {}, "Points"), h("table", {}, h("tbody", {}, keypoints.map((k) => {
-    const w = worst(k.id);
-    return h("tr", { title: w?.message ?? "" }, h("td", {}, h("button", { type: "button", class: "btn ghost tiny", data: { key: `look-${k.id}` }, onclick: () => shell.view.send({ focus: k.id }) }, k.id)),
-      h("td", { class: "l" }, w ? tag(w.severity === "error" ? "bad" : "warn", w.severity === "error" ? "unusable" : "doubtful") : insight ? tag("good", "usable") : ""),
-      h("td", { class: "num" }, `${k.x_mm.toFixed(1)} ${k.y_mm.toFixed(1)} ${k.z_mm.toFixed(1)}`),
-      h("td", {}, button("✕", () => shell.do(() => shell.view.send({ delete: k.id })), { class: "ghost tiny", "aria-label": `Delete ${k.id}`, key: `del-${k.id}` })));
-  }))));
-}
-
 const step = (shell, which) => shell.do(() => shell.view.send({ [which]: true }));
 export const undo = (shell, again) => step(shell, again ? "redo" : "undo");
 export function leave(shell) { shell.view.say(null); }
@@ -85,5 +73,5 @@ export function footer(shell) {
 export function drawer(shell) {
   const { keypoints, insight } = shell.project.data;
   if (!keypoints?.length) return { tabs: [], stamp: "" };
-  return { stamp: JSON.stringify([keypoints, insight?.version]), tabs: [{ key: "points", title: "Key points", draw: (body) => planned(body, keypoints, insight?.issues ?? [], (id) => shell.view.send({ focus: id })) }] };
+  return { stamp: JSON.stringify([keypoints, insight?.version]), tabs: [{ key: "points", title: "Key points", draw: (body) => planned(body, keypoints, insight, (id) => shell.view.send({ focus: id }), (id) => shell.do(() => shell.view.send({ delete: id }))) }] };
 }

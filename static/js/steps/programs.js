@@ -26,11 +26,9 @@ export function program(shell, kind, title, state, manifest) {
 
 /** What of a manifest a person wants to know. */
 function numbers(m) {
-  const proof = m.proof ?? m;
-  const files = m.files ? (Array.isArray(m.files) ? m.files.length : Object.keys(m.files).length) : null;
-  return [["Name", m.name ? h("span", { class: "num" }, m.name) : null], ["Files", files === null ? null : whole(files)], ["Poses", proof.poses === undefined ? null : whole(proof.poses)],
-    ["Size", proof.bytes === undefined ? null : bytes(proof.bytes)],
-    ["Largest difference", proof.max_position_mm === undefined ? null : fixed(proof.max_position_mm, 4), "mm"], ["", proof.max_angle_deg === undefined ? null : fixed(proof.max_angle_deg, 4), "deg"]];
+  const d = m.largest_difference ?? {};
+  return [["Program", m.program ? h("span", { class: "num" }, m.program) : null], ["Files", whole(Object.keys(m.files ?? {}).length)], ["Poses", m.poses === undefined ? null : whole(m.poses)], ["Size", m.bytes === undefined ? null : bytes(m.bytes)],
+    ["Written against planned", Number.isFinite(d.mm) ? `${fixed(d.mm, 4)} mm, ${fixed(d.deg, 4)}°` : null]];
 }
 
 export function footer(shell) {

@@ -42,7 +42,7 @@ export function footer(shell) {
   const busy = shell.busy("simulate", "assessment");
   const assess = () => shell.do(() => shell.project.run("/assessments", { scan: (after ?? before).number, ...(after && before ? { before: before.number } : {}) }));
   return [
-    h("div", { class: "row tight" }, button("Rehearse before", () => rehearse(shell, "inspection"), { class: "tiny", disabled: busy }), button("Rehearse corrected", () => rehearse(shell, "corrected"), { class: "tiny", disabled: busy || !a?.program?.available })),
+    h("div", { class: "row tight" }, button("Rehearse uncorrected", () => rehearse(shell, "inspection"), { class: "tiny", disabled: busy }), button("Rehearse corrected", () => rehearse(shell, "corrected"), { class: "tiny", disabled: busy || !a?.program?.available })),
     after || before ? button(busy ? "Working…" : "Assess the inspection scan", assess, { class: "primary", disabled: busy, key: "assess" })
       : a?.program?.available && h("a", { class: "btn primary", style: { textAlign: "center", textDecoration: "none", lineHeight: "26px" }, href: href(`${shell.project.path}/programs/corrected`), download: "" }, "Download the corrected program"),
   ];

@@ -64,8 +64,10 @@ export function draw(setup) {
 
 /** Ask for the hidden truth and run the simulated scanner. */
 export async function rehearse(shell, path) {
-  const body = await askRehearsal(path, draw(shell.project.data.setup), shell.local.truth);
-  if (body) { shell.local.truth = body.offset; await shell.do(async () => { await shell.project.run("/simulate", body); await shell.view.refresh(); }); }
+  // The part stays where it is between the scans of one rehearsal.
+  const known = shell.project.data.scans?.filter((s) => s.path === "alignment" && s.origin === "simulated").at(-1)?.detail?.options?.offset ?? null;
+  const body = await askRehearsal(path, draw(shell.project.data.setup), path === "alignment" ? null : known);
+  if (body) { await shell.do(async () => { await shell.project.run("/simulate", body); await shell.view.refresh(); }); }
 }
 
 export function footer(shell) {

@@ -1,0 +1,47 @@
+"""Makes docs/img/page.png: the aerofoil sample, aligned. Run `python -m tests.browser.picture`."""
+
+import shutil
+import tempfile
+from pathlib import Path
+
+from playwright.sync_api import sync_playwright
+
+from tests.browser import journey
+from tests.browser.eyes import ARGS
+from tests.browser.real_server import ROOT, RealServer
+
+OFFSET = {"x": "1.4", "y": "-1.9", "z": "2.3", "a": "0.12", "b": "-0.2", "c": "0.35"}
+STEPS = {"Key points": "keypoints", "Paths": "paths", "Alignment": "page"}
+
+
+def main() -> None:
+    """Go through the whole job and keep a picture of three steps."""
+    folder = Path(tempfile.mkdtemp())
+    server = RealServer(folder)
+    try:
+        with sync_playwright() as playwright:
+            browser = playwright.chromium.launch(executable_path=shutil.which("chromium"), headless=True, args=ARGS)
+            page = browser.new_page(viewport={"width": 1440, "height": 900})
+            journey.open_sample(page, server.url, "Try the aerofoil")
+            journey.seen(page)
+            journey.suggest(page)
+            journey.plan(page)
+            journey.rehearse(page, OFFSET)
+            journey.align(page)
+            for step, name in STEPS.items():
+                journey.step(page, step)
+                page.wait_for_timeout(12_000)
+                # The warning about software rendering belongs to machines without a graphics card.
+                page.frame_locator("iframe").locator(".mantine-Notifications-root").evaluate_all(
+                    "n => n.forEach(e => e.remove())"
+                )
+                page.wait_for_timeout(1_000)
+                page.screenshot(path=ROOT / "docs" / "img" / f"{name}.png")
+            browser.close()
+    finally:
+        server.stop()
+        shutil.rmtree(folder)
+
+
+if __name__ == "__main__":
+    main()
