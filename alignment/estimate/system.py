@@ -16,6 +16,8 @@ from planner.frames import Array, Transform
 # Crossings of one stretch of this length, one way of crossing and one side are one row (mm).
 EDGE_CELL_MM = 8.0
 MOST_EDGE_ROWS = 90
+LAWS_PER_ROW = 12.0
+COARSENINGS = 20
 # What the beam's asymmetry and the detection may shift every crossing by, as a share of the beam width, and what a late
 # clock may shift it by along the travel (mm). Both are estimated along; opposite edges and passes tell them apart.
 BIAS_SHARE = 0.1
@@ -82,10 +84,11 @@ def nuisance_columns(edges: EdgeData, found: EdgeRows) -> Array:
 
 def _joined(surface: NoiseRows, edges: EdgeData, found: EdgeRows, prior_sigma: Array, nuisance: Array) -> NoiseRows:
     picked = np.flatnonzero(edges.used)
-    points, cell = edges.points, EDGE_CELL_MM
-    while True:
+    points, cell, laws = edges.points, EDGE_CELL_MM, LAWS_PER_ROW
+    # Coarser along the stretch and across the laws until it fits; one row a pass and side is as coarse as it gets.
+    for _ in range(COARSENINGS):
         stretch = np.floor(points.s_mm[picked] / cell).astype(np.int64)
-        band = np.where(points.along[picked], np.floor(points.law[picked] / 12.0), 0).astype(np.int64)
+        band = np.where(points.along[picked], np.floor(points.law[picked] / laws), 0).astype(np.int64)
         leaving = (found.lag[picked] > 0).astype(np.int64)
         side = np.where(np.abs(found.lag[picked]) > 0.3, leaving, 2 + _side(found, picked))
         key = np.column_stack([points.pass_id[picked], stretch, points.along[picked], band, side])
@@ -93,7 +96,7 @@ def _joined(surface: NoiseRows, edges: EdgeData, found: EdgeRows, prior_sigma: A
         n = 1 + int(at.max(initial=-1))
         if n <= MOST_EDGE_ROWS:
             break
-        cell *= 1.3
+        cell, laws = 1.3 * cell, 1.3 * laws
     count = np.bincount(at, minlength=n).astype(np.float64)
 
     def mean(values: Array) -> Array:
