@@ -92,8 +92,7 @@ def _poses(path: ToolPath) -> _Poses | None:
     row = np.flatnonzero(path.is_data)
     if not len(row):
         return None
-    frames = path.Ts_part_contact[row]
-    axes, p = frames.rotation_matrix, frames.xyz_mm
+    axes, p = path.Ts_part_contact.rotation_matrix[row], path.Ts_part_contact.xyz_mm[row]
     new = np.concatenate([[True], (np.diff(row) > 1) | (np.diff(path.pass_id[row]) != 0)])
     run = np.cumsum(new) - 1
     start = np.flatnonzero(new)
@@ -148,25 +147,27 @@ def _test(
     """Mark samples that lie under the motion from the poses to their successors, or from their predecessors."""
     half = setup.probe.swath_mm / 2.0
     least = np.cos(np.radians(setup.tolerances.tilt_deg))
-    for a, b in ((pose, np.minimum(pose + 1, poses.last[pose])), (np.maximum(pose - 1, poses.first[pose]), pose)):
-        x = points[sample]
-        # Between the planes of the two array positions: signed distances past the first and short of the second.
-        past = np.einsum("ij,ij->i", x - poses.points[a], poses.travel[a])
-        short = np.einsum("ij,ij->i", poses.points[b] - x, poses.travel[b])
-        between = (past >= -_EPS_MM) & (short >= -_EPS_MM) & (a != b)
-        s, i, j, x = sample[between], a[between], b[between], x[between]
-        f = (past[between] / np.maximum(past[between] + short[between], 1e-9)).clip(0.0, 1.0)[:, None]
-        off = x - (1.0 - f) * poses.points[i] - f * poses.points[j]
-        array = (1.0 - f) * poses.arrays[i] + f * poses.arrays[j]
-        up = (1.0 - f) * poses.normals[i] + f * poses.normals[j]
-        up /= np.linalg.norm(up, axis=1, keepdims=True)
-        height = np.einsum("ij,ij->i", off, up)
-        hit = (np.abs(np.einsum("ij,ij->i", off, array)) <= half) & (np.abs(height) <= half + setup.standoff_mm)
-        facing = np.einsum("ij,ij->i", up, normals[s])
-        hit &= facing > 0.0
-        swept[s[hit]] = True
-        good = hit & (facing >= least) & (np.abs(height) <= setup.tolerances.standoff_mm)
-        within[s[good]] = True
+    x = points[sample]
+    past = np.einsum("ij,ij->i", x - poses.points[pose], poses.travel[pose])
+    ahead = past >= 0.0
+    a = np.where(ahead, pose, np.maximum(pose - 1, poses.first[pose]))
+    b = np.where(ahead, np.minimum(pose + 1, poses.last[pose]), pose)
+    # Between the planes of the two array positions: signed distances past the first and short of the second.
+    other = np.where(ahead, b, a)
+    rest = np.einsum("ij,ij->i", x - poses.points[other], poses.travel[other])
+    past, short = np.where(ahead, past, rest), np.where(ahead, -rest, -past)
+    between = np.flatnonzero((past >= -_EPS_MM) & (short >= -_EPS_MM) & (a != b))
+    s, i, j, x = sample[between], a[between], b[between], x[between]
+    f = (past[between] / np.maximum(past[between] + short[between], 1e-9)).clip(0.0, 1.0)[:, None]
+    off = x - (1.0 - f) * poses.points[i] - f * poses.points[j]
+    array = (1.0 - f) * poses.arrays[i] + f * poses.arrays[j]
+    up = (1.0 - f) * poses.normals[i] + f * poses.normals[j]
+    up /= np.sqrt(np.einsum("ij,ij->i", up, up))[:, None]
+    height = np.abs(np.einsum("ij,ij->i", off, up))
+    facing = np.einsum("ij,ij->i", up, normals[s])
+    hit = (np.abs(np.einsum("ij,ij->i", off, array)) <= half) & (height <= half + setup.standoff_mm) & (facing > 0.0)
+    swept[s[hit]] = True
+    within[s[hit & (facing >= least) & (height <= setup.tolerances.standoff_mm)]] = True
 
 
 def _summary(

@@ -92,7 +92,6 @@ def overrun(
     first, last = np.searchsorted(run, np.arange(k)), np.searchsorted(run, np.arange(k), side="right") - 1
     if not count or not any(over):
         return DataRuns(points, normals, travel, face, bary, run, np.ones(k, dtype=np.int8))
-    frames = contact_frames(points, normals, travel)
     inside = max(round(6.0 / spacing_mm), 2)
     parts: list[tuple[Array, ...]] = [(points, normals, travel)]
     key, runs = [np.arange(len(run)) * 1.0], [run]
@@ -103,7 +102,8 @@ def overrun(
         a = at[which]
         toward = np.clip(a - int(sign) * inside, first[which], last[which])
         steps = np.tile(sign * length * np.arange(1, count + 1) / count, (len(a), 1))
-        frame = extrapolate(frames, a, toward, steps, _OVERRUN_TURN_RAD)
+        here, inner = (contact_frames(points[i], normals[i], travel[i]) for i in (a, toward))
+        frame = extrapolate(here, inner, steps, _OVERRUN_TURN_RAD)
         axes = frame.rotation_matrix
         parts.append((frame.xyz_mm, axes[:, :, 2], axes[:, :, 0]))
         key.append((a[:, None] + sign * np.arange(1, count + 1) / (2.0 * count + 2.0)).ravel())

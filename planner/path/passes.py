@@ -36,9 +36,13 @@ class DataRuns:
 
 def contact_frames(points: Array, normals: Array, travel: Array) -> Transform:
     """Return `Ts_part_contact`: z along the normal, x along travel made square to it."""
-    x = travel - np.einsum("ij,ij->i", travel, normals)[:, None] * normals
-    x /= np.linalg.norm(x, axis=1, keepdims=True)
+    x = _square(travel, normals)
     return Transform.from_axes("part", "contact", x, np.cross(normals, x), normals, points)
+
+
+def _square(travel: Array, normals: Array) -> Array:
+    x = travel - np.einsum("ij,ij->i", travel, normals)[:, None] * normals
+    return np.asarray(x / np.linalg.norm(x, axis=1, keepdims=True))
 
 
 def headings(points: Array, normals: Array, travel: Array, run: Ints, across: Array | None) -> NDArray[np.int8]:
@@ -63,21 +67,18 @@ def assemble(data: DataRuns, kind: PathKind, standoff_mm: float, spacing_mm: flo
     The leads go on tangentially with the curvature the pass has at its ends, so that the motion has no kink where data
     begin. They are off the surface (face -1), as are approach and retract, which stand above the outer lead poses.
     """
-    frames = contact_frames(data.points, data.normals, data.travel)
     k = len(data.heading)
     first = np.searchsorted(data.run, np.arange(k))
     last = np.searchsorted(data.run, np.arange(k), side="right") - 1
-    before = _leads(frames, first, last, +1, spacing_mm)
-    after = _leads(frames, last, first, -1, spacing_mm)
+    before = _leads(data, first, last, +1, spacing_mm)
+    after = _leads(data, last, first, -1, spacing_mm)
     leads = len(before) // k
     rank = np.arange(leads)
     n = len(data.run)
-    source = Transform.from_parts(
-        "part",
-        "contact",
-        type(frames.rotation).concatenate([frames.rotation, before.rotation, after.rotation]),
-        np.concatenate([frames.xyz_mm, before.xyz_mm, after.xyz_mm]),
-    )
+    lead_axes = np.concatenate([before.rotation_matrix, after.rotation_matrix])
+    x = np.concatenate([_square(data.travel, data.normals), lead_axes[:, :, 0]])
+    z = np.concatenate([data.normals, lead_axes[:, :, 2]])
+    p = np.concatenate([data.points, before.xyz_mm, after.xyz_mm])
     size = last - first + 1
     total = size + 2 * leads + 2
     offset = np.concatenate([[0], np.cumsum(total)])[:-1]
@@ -94,14 +95,14 @@ def assemble(data: DataRuns, kind: PathKind, standoff_mm: float, spacing_mm: flo
     row[down], role[down] = row[down - 1], Role.RETRACT
     face = np.concatenate([data.face, np.full(2 * k * leads, -1, dtype=np.int32)])
     bary = np.concatenate([data.bary, np.zeros((2 * k * leads, 3))])
-    face, bary = face[row], bary[row]
+    face, bary, x, z = face[row], bary[row], x[row], z[row]
     off = role != Role.DATA
     face[off], bary[off] = -1, 0.0
     above = (role == Role.APPROACH) | (role == Role.RETRACT)
     run = np.repeat(np.arange(k), total)
     return ToolPath(
         kind=kind,
-        Ts_part_contact=source[row],
+        Ts_part_contact=Transform.from_axes("part", "contact", x, np.cross(z, x), z, p[row]),
         standoff_mm=np.where(above, standoff_mm + CLEARANCE_MM, standoff_mm),
         heading=data.heading[run],
         pass_id=run.astype(np.int32),
@@ -111,30 +112,30 @@ def assemble(data: DataRuns, kind: PathKind, standoff_mm: float, spacing_mm: flo
     )
 
 
-def extrapolate(frames: Transform, at: Ints, toward: Ints, steps: Array, turn_limit_rad: float) -> Transform:
-    """Return the frames at `at` continued away from `toward` (k,) by signed `steps` (k, l) mm of travel: stack k * l.
+def extrapolate(at: Transform, toward: Transform, steps: Array, turn_limit_rad: float) -> Transform:
+    """Return the frames `at` (k) continued away from `toward` (k) by signed `steps` (k, l) mm of travel: stack k * l.
 
     The motion goes on as the screw that leads from `at` to `toward` a few mm inside; its turn over the whole length is
     limited. Straight where the pass is straight.
     """
-    reach = frames[at].inv() @ frames[toward]
-    xi = reach.exp
-    inside = np.linalg.norm(frames.xyz_mm[toward] - frames.xyz_mm[at], axis=1)
-    rate = xi[:, :3] / np.maximum(inside, 1e-9)[:, None]
+    turn = (at.inv() @ toward).exp[:, :3]
+    inside = np.linalg.norm(toward.xyz_mm - at.xyz_mm, axis=1)
+    rate = turn / np.maximum(inside, 1e-9)[:, None]
     longest = np.abs(steps).max(axis=1)
     scale = np.minimum(1.0, turn_limit_rad / np.maximum(np.linalg.norm(rate, axis=1) * longest, 1e-12))
     rate = np.where(inside[:, None] > 0, rate * scale[:, None], 0.0)
     twist = np.zeros((*steps.shape, 6))
     twist[..., :3] = rate[:, None, :] * np.abs(steps)[..., None] * -1.0
     twist[..., 3] = steps
-    start = np.repeat(at, steps.shape[1])
-    return frames[start] @ Transform.from_exp("contact", "contact", twist.reshape(-1, 6))
+    start = np.repeat(np.arange(len(steps)), steps.shape[1])
+    return at[start] @ Transform.from_exp("contact", "contact", twist.reshape(-1, 6))
 
 
-def _leads(frames: Transform, at: Ints, end: Ints, inward: int, spacing_mm: float) -> Transform:
+def _leads(data: DataRuns, at: Ints, end: Ints, inward: int, spacing_mm: float) -> Transform:
     """Return lead poses of every pass, nearest first."""
     count = max(int(np.ceil(LEAD_MM / spacing_mm)), 2)
     steps = np.tile(-inward * LEAD_MM * np.arange(1, count + 1) / count, (len(at), 1))
     inside = max(round(4.0 / spacing_mm), 2)
     toward = np.where(inward > 0, np.minimum(at + inside, end), np.maximum(at - inside, end))
-    return extrapolate(frames, at, toward, steps, _LEAD_TURN_RAD)
+    here, inner = (contact_frames(data.points[i], data.normals[i], data.travel[i]) for i in (at, toward))
+    return extrapolate(here, inner, steps, _LEAD_TURN_RAD)

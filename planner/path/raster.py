@@ -122,10 +122,20 @@ def _in_order(track: Tracks, axes: ScanAxes) -> Tracks:
 
 def _travel(track: Tracks, points: Array, normals: Array, across: Array, spacing: float, exact: bool) -> Array:
     """Return the direction of travel (n, 3), unit and tangent; smooth, for the array turns with it."""
-    rough = tangent(along_track(track, points, spacing), normals)
     if not exact:
-        return rough
+        return tangent(along_track(track, points, spacing), normals)
     straight = np.cross(across, normals)
-    straight *= np.sign(np.einsum("ij,ij->i", straight, rough))[:, None]
-    sound = np.linalg.norm(straight, axis=1, keepdims=True) > 0.5
-    return np.where(sound, straight, rough)
+    rough = _forwards(track)
+    straight *= np.where(np.einsum("ij,ij->i", straight, rough) < 0, -1.0, 1.0)[:, None]
+    # Where a plane only grazes the surface, its line is all there is to go by.
+    grazing = np.linalg.norm(straight, axis=1) < 0.5
+    straight[grazing] = tangent(rough, normals)[grazing]
+    return straight
+
+
+def _forwards(track: Tracks) -> Array:
+    """Return differences (n, 3) to the next point of the run; of the last, from the one before."""
+    first, last = track.bounds()
+    ahead = np.diff(track.points, axis=0, append=track.points[-1:])
+    ahead[last] = ahead[np.maximum(last - 1, first)]
+    return ahead

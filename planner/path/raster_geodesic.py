@@ -1,5 +1,8 @@
 """Strategy `geodesic`: lines of equal distance, measured on the surface, from a guide line along the scan direction."""
 
+from dataclasses import dataclass
+from weakref import WeakKeyDictionary
+
 import numpy as np
 from numpy.typing import NDArray
 
@@ -28,13 +31,8 @@ def geodesic_cut(curved: CurvedSurface, mesh: PathMesh, axes: ScanAxes, setup: S
     points are then handed back to the triangles of the surface. On a closed surface the two sides of the guide meet on a
     ridge: passes there stand half a step from it.
     """
-    size = float(np.linalg.norm(np.ptp(mesh.vertices[mesh.faces].reshape(-1, 3), axis=0)))
-    closed = fill_holes(mesh)
-    whole = split_long_edges(closed.vertices, closed.faces, size * _FINENESS)
-    height = whole.vertices @ axes.across
-    d = guide_distance(whole.vertices, whole.faces, height - _guide_offset(whole, height))
-    fine = whole.only(whole.parent < len(mesh.faces))
-    cut_mesh = PathMesh(fine.vertices, fine.faces)
+    guided = _guided(mesh, axes)
+    fine, d, cut_mesh = guided.fine, guided.distance, guided.mesh
     towards = _towards_higher(fine, d)
     s = surface_samples(curved, cut_mesh, fine)
     half = effective_half_mm(s.shape, tangent(towards[s.face], s.normals), setup)
@@ -52,6 +50,34 @@ def geodesic_cut(curved: CurvedSurface, mesh: PathMesh, axes: ScanAxes, setup: S
         return tangent(towards[face], normals)
 
     return Cut(cut_mesh, isolines(d, fine.faces, cut_mesh.other, at), across, exact=False, fine=fine)
+
+
+@dataclass(frozen=True, eq=False)
+class _Guided:
+    """The distance field: fine triangles of the surface, the same as a mesh, signed distance (v,) at its vertices."""
+
+    axes: ScanAxes
+    fine: Subdivision
+    mesh: PathMesh
+    distance: Array
+
+
+# The field is the slow part and depends on the surface and the direction only: kept until either changes.
+_KNOWN: WeakKeyDictionary[PathMesh, _Guided] = WeakKeyDictionary()
+
+
+def _guided(mesh: PathMesh, axes: ScanAxes) -> _Guided:
+    known = _KNOWN.get(mesh)
+    if known is not None and (known.axes.along == axes.along).all() and (known.axes.across == axes.across).all():
+        return known
+    size = float(np.linalg.norm(np.ptp(mesh.vertices[mesh.faces].reshape(-1, 3), axis=0)))
+    closed = fill_holes(mesh)
+    whole = split_long_edges(closed.vertices, closed.faces, size * _FINENESS)
+    height = whole.vertices @ axes.across
+    d = guide_distance(whole.vertices, whole.faces, height - _guide_offset(whole, height))
+    fine = whole.only(whole.parent < len(mesh.faces))
+    made = _KNOWN[mesh] = _Guided(axes, fine, PathMesh(fine.vertices, fine.faces), d)
+    return made
 
 
 def _guide_offset(whole: Subdivision, height: Array) -> float:

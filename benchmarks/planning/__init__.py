@@ -1,0 +1,1 @@
+"""Planning on eight analytic panels: accuracy and time, beside trimesh's slicing."""
