@@ -18,7 +18,10 @@ MAX_HALVINGS = 9
 
 @dataclass(frozen=True, eq=False)
 class Clearance:
-    """Smallest clearance (mm) of nozzle and wrist at each pose and on the way to the next one, (n,) each."""
+    """Clearance (mm) of nozzle and wrist at each pose and on the way to the next one, (n,) each.
+
+    Negative where they touch; a way that is found to touch is not searched for its deepest place.
+    """
 
     nozzle_mm: Array
     wrist_mm: Array

@@ -76,7 +76,7 @@ def say_clearance(path: ToolPath, found: Clearance) -> list[Issue]:
         hit,
         "error",
         "collision-nozzle",
-        "At {count} of {of} poses, or on the way to the next, the nozzle runs into the part, by up to {worst:.1f} mm.",
+        "At {count} of {of} poses, or on the way to the next, the nozzle runs into the part, by {worst:.1f} mm or more.",
         "Check nozzle_radius_mm and nozzle_length_mm, raise standoff_mm, or leave the place out (keep-out, edge margin).",
         -found.nozzle_mm,
     )

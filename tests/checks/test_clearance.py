@@ -102,8 +102,8 @@ def test_a_block_between_two_poses_is_found() -> None:
     ends, _ = clearance_mm(solid_of(part), path.Ts_part_tcp, Envelope(RADIUS, LENGTH))
     assert ends.min() > 0.0
     found = path_clearance(solid_of(part), path, Envelope(RADIUS, LENGTH), 0.0)
-    assert found.nozzle_mm[1] < -15.0
-    assert found.nozzle_mm[3] > 0.0
+    assert found.nozzle_mm[1] < -2.0
+    assert found.nozzle_mm[[0, 2, 3]].min() > 0.0
     away = path_on(surface, flat, setup, rows=(40.0,), half_mm=90.0, spacing_mm=180.0)
     assert path_clearance(solid_of(part), away, Envelope(RADIUS, LENGTH), 0.0).nozzle_mm.min() > 0.0
 
