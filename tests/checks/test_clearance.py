@@ -30,8 +30,8 @@ def ridges(x, y):
 
 
 def brute(part, poses: Transform) -> np.ndarray:
-    """Return the smallest distance of 0.7 mm samples of the part from the cylinder, pose by pose."""
-    points = surface_samples(part, 0.7)
+    """Return the smallest distance of 1.2 mm samples of the part from the cylinder, pose by pose."""
+    points = surface_samples(part, 1.2)
     return np.array(
         [
             cylinder_distance_mm((points - poses.xyz_mm[i]) @ poses.rotation_matrix[i], RADIUS, LENGTH).min()
