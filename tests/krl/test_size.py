@@ -40,7 +40,9 @@ def test_modules_hold_whole_passes_within_their_lines(controller: str):
 @pytest.mark.parametrize("controller", ["krc2", "krc4"])
 def test_a_pass_longer_than_a_module_goes_on_in_the_next_without_a_gap(controller: str):
     path = stacked(700, 2, 1.0)
-    made = export(path, setup(controller, taught=False), "EB_BIG", options=ProgramOptions(module_lines=300, load_modules=30))
+    made = export(
+        path, setup(controller, taught=False), "EB_BIG", options=ProgramOptions(module_lines=300, load_modules=30)
+    )
     assert any(b"PASS 1 PART 2" in d for d in made.files.values())
     reading = read_program(made.files)
     assert reading.path.data_on.sum() == 2 * 699
@@ -50,7 +52,8 @@ def test_a_pass_longer_than_a_module_goes_on_in_the_next_without_a_gap(controlle
 
 def test_what_does_not_fit_comes_in_loads_each_with_its_own_main_and_start():
     path = stacked(60, 12, 2.0)
-    made = export(path, setup("krc4"), "EB_BIG", T_base_basecorr=correction(), options=ProgramOptions(module_lines=200, load_modules=4))
+    options = ProgramOptions(module_lines=200, load_modules=4)
+    made = export(path, setup("krc4"), "EB_BIG", T_base_basecorr=correction(), options=options)
     loads = made.program.loads
     assert len(loads) > 1
     assert [i.code for i in made.issues if i.severity == "warning" and i.code == "krl-loads"] == ["krl-loads"]
@@ -92,13 +95,27 @@ def test_the_zip_holds_modules_manifest_dense_path_and_run_sheet():
     assert data == bundle(made, path, s, {"extra.txt": b"x"})
     with zipfile.ZipFile(BytesIO(data)) as archive:
         names = set(archive.namelist())
-        assert {f"krl/{n}" for n in made.files} | {"manifest.json", "path.csv", "run_sheet.html", "run_sheet.txt", "extra.txt"} == names
+        beside = {"manifest.json", "path.csv", "run_sheet.html", "run_sheet.txt", "extra.txt"}
+        assert {f"krl/{n}" for n in made.files} | beside == names
         assert {n: archive.read(f"krl/{n}") for n in made.files} == made.files
         manifest = json.loads(archive.read("manifest.json"))
         table = pl.read_csv(archive.read("path.csv"))
         sheet, html = archive.read("run_sheet.txt").decode(), archive.read("run_sheet.html").decode()
     assert manifest["files"] == made.manifest["files"]
-    assert table.columns == ["pass", "role", "x_mm", "y_mm", "z_mm", "a_deg", "b_deg", "c_deg", "nx", "ny", "nz", "standoff_mm"]
+    assert table.columns == [
+        "pass",
+        "role",
+        "x_mm",
+        "y_mm",
+        "z_mm",
+        "a_deg",
+        "b_deg",
+        "c_deg",
+        "nx",
+        "ny",
+        "nz",
+        "standoff_mm",
+    ]
     assert table.height == len(path)
     # The poses sent are rows of the dense path, number for number.
     rows = {tuple(r) for r in table.select("x_mm", "y_mm", "z_mm", "a_deg", "b_deg", "c_deg").rows()}
