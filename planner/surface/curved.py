@@ -19,7 +19,7 @@ from planner.surface.vertex_fit import VertexFit, fit_vertices
 # Share of the area whose worst triangle gives the angle error.
 COVERED = 0.9999
 FOOT_STEPS = 6
-FOOT_TOLERANCE_MM = 1e-6
+FOOT_TOLERANCE_MM = 1e-5
 
 
 def footprint_mm(probe: Probe) -> float:
@@ -106,15 +106,21 @@ class CurvedSurface:
             active, step = active[far], step[far]
             if not len(active):
                 break
-            face[active], bary[active] = self._on_triangles(points[active] + step)
+            # Most steps stay inside their triangle; only those that leave it need a search.
+            at = points[active] + step
+            bary[active] = self._barycentric(face[active], at)
+            left = (bary[active] < 0.0).any(axis=1)
+            face[active[left]], bary[active[left]] = self._on_triangles(at[left])
             points[active], normals[active] = self.evaluate(face[active], bary[active])
         return self._foot(query, face, bary, points, normals)
 
     def _on_triangles(self, query: Array) -> tuple[NDArray[np.int32], Array]:
         _, face, at = self._tree.squared_distance(self._vertices, self._faces, query)
-        return face.astype(np.int32), self._barycentric(face, at)
+        bary = np.clip(self._barycentric(face, at), 0.0, 1.0)
+        return face.astype(np.int32), bary / bary.sum(axis=1, keepdims=True)
 
     def _barycentric(self, face: NDArray, at: Array) -> Array:
+        """Return barycentrics (n, 3) of points over the planes of faces; negative outside of the triangle."""
         a, b, c = (self._vertices[self._faces[face, k]] for k in range(3))
         u, v, w = b - a, c - a, at - a
         uu, uv, vv, wu, wv = (np.einsum("ij,ij->i", p, q) for p, q in ((u, u), (u, v), (v, v), (w, u), (w, v)))
@@ -122,20 +128,23 @@ class CurvedSurface:
         det = np.where(det > 0, det, 1.0)
         bary = np.stack([np.zeros_like(det), (vv * wu - uv * wv) / det, (uu * wv - uv * wu) / det], axis=1)
         bary[:, 0] = 1.0 - bary[:, 1] - bary[:, 2]
-        bary = np.clip(bary, 0.0, 1.0)
-        return np.asarray(bary / bary.sum(axis=1, keepdims=True))
+        return bary
 
     def _foot_step(self, query: Array, face: NDArray, bary: Array, points: Array, normals: Array) -> Array:
         """Return the Newton step (n, 3) along the surface that makes query - foot parallel to the normal."""
         offset = query - points
         height = np.einsum("ij,ij->i", offset, normals)
         along = offset - height[:, None] * normals
-        system = np.eye(3) + height[:, None, None] * self.shape_operator(face, bary)
+        turned = height[:, None, None] * self.shape_operator(face, bary)
+        # In the tangent plane A = 1 + h W is 2 x 2: its inverse is (tr A - A) / det A (Cayley and Hamilton).
+        trace = np.einsum("nii->n", turned)
+        det = 1.0 + trace + 0.5 * (trace**2 - np.einsum("nij,nij->n", turned, turned))
+        half = 1.0 + 0.5 * trace
+        smallest = half - np.sqrt(np.maximum(half**2 - det, 0.0))
+        step = (1.0 + trace)[:, None] * along - np.einsum("nij,nj->ni", turned, along)
         # Near a centre of curvature the system is singular; there a plain projection is the cautious step.
-        safe = np.linalg.eigvalsh(system)[:, 0] > 0.2
-        step = along.copy()
-        step[safe] = np.linalg.solve(system[safe], along[safe][..., None])[..., 0]
-        return step
+        safe = smallest > 0.2
+        return np.where(safe[:, None], step / np.where(safe, det, 1.0)[:, None], along)
 
     def _foot(self, query: Array, face: NDArray, bary: Array, points: Array, normals: Array) -> Foot:
         offset = query - points
@@ -163,7 +172,8 @@ class CurvedSurface:
         o, d, f = origins[hit], directions[hit], face[hit]
         plane = self.surface.face_normals[f]
         reach = np.einsum("ij,ij->i", self._vertices[self._faces[f, 0]] - o, plane) / np.einsum("ij,ij->i", d, plane)
-        b = self._barycentric(f, o + reach[:, None] * d)
+        b = np.clip(self._barycentric(f, o + reach[:, None] * d), 0.0, 1.0)
+        b /= b.sum(axis=1, keepdims=True)
         for _ in range(2):
             p, n = self.evaluate(f, b)
             reach = np.einsum("ij,ij->i", p - o, n) / np.einsum("ij,ij->i", d, n)
