@@ -33,10 +33,7 @@ def brute(part, poses: Transform) -> np.ndarray:
     """Return the smallest distance of 1.2 mm samples of the part from the cylinder, pose by pose."""
     points = surface_samples(part, 1.2)
     return np.array(
-        [
-            cylinder_distance_mm((points - poses.xyz_mm[i]) @ poses.rotation_matrix[i], RADIUS, LENGTH).min()
-            for i in range(len(poses))
-        ]
+        [cylinder_distance_mm(poses[i].inv().rigid.apply(points), RADIUS, LENGTH).min() for i in range(len(poses))]
     )
 
 
