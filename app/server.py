@@ -35,6 +35,7 @@ from app.api.project_model import StoreModel
 from app.jobs.dask_slot import DaskSlot, connect
 from app.jobs.runner import JobRunner
 from app.jobs.slot import ProcessSlot, Slot
+from app.jobs.thinker import Thinker
 from app.security import Guard
 from app.settings import ServerSettings
 from app.store.projects import get
@@ -69,6 +70,7 @@ def create_app(settings: ServerSettings) -> FastAPI:
             context.store.exchange.close()
             context.runner.stop()
             context.views.close_all()
+            context.thinker.close()
             context.store.close()
 
     app = FastAPI(
@@ -107,7 +109,9 @@ def open_context(settings: ServerSettings) -> Context:
     except BaseException:
         store.close()
         raise
-    return Context(settings, store, runner, ViewRegistry(lambda project_id: StoreModel(store, project_id)))
+    thinker = Thinker()
+    views = ViewRegistry(lambda project_id: StoreModel(store, project_id, thinker))
+    return Context(settings, store, runner, views, thinker)
 
 
 def _slots(settings: ServerSettings) -> Any:
@@ -220,7 +224,7 @@ def _require_safe_address(settings: ServerSettings) -> None:
         return
     raise refuse(
         409, "address-open", f"{settings.host} can be reached by others, and EchoBase has no accounts.",
-        "Put a proxy that checks who comes in front, and name the exact host[:port] that browsers use in ECHOBASE_ALLOWED_HOSTS.",
+        "Put a proxy that checks who comes in front, and name the exact host[:port] of browsers in ECHOBASE_ALLOWED_HOSTS.",
         "--host",
     )  # fmt: skip
 

@@ -7,6 +7,7 @@ from fastapi import Depends, Path
 from fastapi.requests import HTTPConnection
 
 from app.jobs.runner import JobRunner
+from app.jobs.thinker import Thinker
 from app.settings import ServerSettings
 from app.store.store import Store
 
@@ -20,6 +21,7 @@ class Context:
     runner: JobRunner
     views: Any
     """`app.view.registry.ViewRegistry`."""
+    thinker: Thinker
 
 
 def context_of(connection: HTTPConnection) -> Context:

@@ -14,13 +14,15 @@ body{font:15px/1.5 system-ui,sans-serif;margin:0 auto;max-width:60rem;padding:1.
 h1{font-size:1.4rem}h2{font-size:1.1rem;margin:2.5rem 0 .5rem;border-bottom:1px solid #d0d7de}
 details{border:1px solid #d0d7de;border-radius:6px;margin:.4rem 0;padding:.4rem .8rem}summary{cursor:pointer}
 code,pre{font:13px/1.45 ui-monospace,monospace}pre{background:#f6f8fa;padding:.7rem;overflow:auto;border-radius:6px}
-.m{display:inline-block;min-width:4.5rem;font-weight:600}table{border-collapse:collapse}td{padding:.1rem .8rem .1rem 0;vertical-align:top}
+.m{display:inline-block;min-width:4.5rem;font-weight:600}
+table{border-collapse:collapse}td{padding:.1rem .8rem .1rem 0;vertical-align:top}
 </style></head><body>
 <h1>{{ info.title }} {{ info.version }}</h1>
 <p>{{ info.description }}</p>
 <p>Machine-readable: <a href="/openapi.json"><code>/openapi.json</code></a> (OpenAPI {{ openapi }}).</p>
 {% for tag, operations in groups.items() %}<h2>{{ tag }}</h2>
-{% for o in operations %}<details id="{{ o.id }}"><summary><span class="m">{{ o.method }}</span><code>{{ o.path }}</code></summary>
+{% for o in operations %}<details id="{{ o.id }}">
+<summary><span class="m">{{ o.method }}</span><code>{{ o.path }}</code></summary>
 <p>{{ o.text }}</p>
 {% if o.parameters %}<table>{% for p in o.parameters %}<tr><td><code>{{ p.name }}</code></td><td>{{ p.place }}</td>
 <td>{{ p.text }}</td></tr>{% endfor %}</table>{% endif %}

@@ -9,8 +9,8 @@ from app.api.context import Ctx, ProjectId
 from app.api.errors import documented
 from app.api.etags import IfMatch, expected, tag
 from app.api.models import PartInfo
-from app.api.receive import receive
 from app.api.parts import info_of, keep_part
+from app.api.receive import receive
 from app.store import inputs, projects
 from app.store.refusal import refuse
 from planner.units import LENGTH_UNITS, LengthUnit

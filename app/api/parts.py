@@ -5,15 +5,15 @@ import json
 import tempfile
 from importlib import import_module
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
 from app.api.models import PartInfo
 from app.store import inputs
-from app.store.blobs import Blob
+from app.store.blobs import Blob, BlobStore
 from app.store.content import get_bytes, put_bytes
 from app.store.inputs import Input
-from app.store.refusal import refuse
 from app.store.store import Store
 from planner.part import Part, Provenance
 from planner.units import MM_PER, LengthUnit
@@ -53,10 +53,14 @@ def load_part(store: Store, project_id: str) -> Part | None:
         if not row.is_given:
             return None
         files = inputs.files_of(session, project_id, f"part:{row.version}")
-    with np.load(io.BytesIO(get_bytes(store.blobs, files["part.npz"].sha256)), allow_pickle=False) as arrays:
+    return part_from(store.blobs, files["part.npz"].sha256, row.content)
+
+
+def part_from(blobs: BlobStore, arrays_sha256: str, content: dict[str, Any]) -> Part:
+    """Return a part from its stored arrays and properties."""
+    with np.load(io.BytesIO(get_bytes(blobs, arrays_sha256)), allow_pickle=False) as arrays:
         vertices, faces = arrays["vertices"], arrays["faces"]
         meta = json.loads(str(arrays["meta"]))
-    content = row.content
     origin = Provenance(content["name"], content["sha256"], content["unit"], tuple(content["notes"]))
     chord = float("nan") if content["chord_error_mm"] is None else float(content["chord_error_mm"])
     return Part(vertices, faces, origin, chord, meta)
@@ -79,10 +83,3 @@ def _npz(part: Part) -> bytes:
         meta = "{}"  # what JSON cannot carry is for the reader's own use
     np.savez(buffer, vertices=part.vertices, faces=part.faces, meta=np.array(meta))
     return buffer.getvalue()
-
-
-def require_part(row: Input) -> Input:
-    """Return the part in force; raises Refusal 409 if there is none."""
-    if not row.is_given:
-        raise refuse(409, "part-missing", "the project has no part yet.", "Upload one first.", "part")
-    return row

@@ -1,5 +1,6 @@
 """`StoreModel`: what the 3D view asks of a project, answered from the store. Nouns are kept while their digests stand."""
 
+import json
 import threading
 from collections.abc import Callable
 from importlib import import_module
@@ -8,9 +9,10 @@ from typing import Any, cast
 import numpy as np
 
 from alignment.cloud import PointCloud
-from app.api.insight import compute_insight
+from app.api.insight import Question, think
 from app.api.parts import load_part
 from app.api.results_model import found_of, load_cloud, load_paths
+from app.jobs.thinker import Thinker
 from app.store import inputs, projects, results
 from app.store.events import Event
 from app.store.freshness import changed_since
@@ -21,7 +23,6 @@ from planner.frames import Array
 from planner.keypoint import KeyPoint, KeyPointList
 from planner.part import Part
 from planner.setup import Setup
-from planner.surface.curved import CurvedSurface, footprint_mm
 from planner.surface.inspection import InspectionSurface
 from planner.toolpath import PathKind, ToolPath
 
@@ -29,10 +30,10 @@ from planner.toolpath import PathKind, ToolPath
 class StoreModel:
     """One project as the view sees it. Safe to call from many threads; each noun is computed once per digest."""
 
-    def __init__(self, store: Store, project_id: str) -> None:
+    def __init__(self, store: Store, project_id: str, thinker: Thinker) -> None:
         with store.db.read() as session:
             projects.get(session, project_id)
-        self._store, self._id = store, project_id
+        self._store, self._id, self._thinker = store, project_id, thinker
         self._lock = threading.RLock()
         self._kept: dict[str, tuple[Any, Any]] = {}
 
@@ -80,15 +81,6 @@ class StoreModel:
         # The same triangles stay the same object, so that nothing behind it is built again at every key point.
         return cast(InspectionSurface, self._keep("surface", (id(part), made.part_faces.tobytes()), lambda: made))
 
-    def curved(self) -> CurvedSurface | None:
-        """Return the smooth surface behind the triangles."""
-        surface = self.surface()
-        if surface is None:
-            return None
-        radius = footprint_mm(self.setup().probe)
-        key = (id(surface), radius)
-        return cast(CurvedSurface, self._keep("curved", key, lambda: CurvedSurface(surface, radius)))
-
     def keypoints(self) -> KeyPointSet:
         """Return the key points and their version."""
         given = self._input("keypoints")
@@ -114,9 +106,21 @@ class StoreModel:
         inputs.put(self._store, self._id, "surface", {"seeds": seeds}, None, who)
 
     def insight(self) -> Insight | None:
-        """Compute what the key points of now are worth."""
-        given, curved = self.keypoints(), self.curved()
-        return None if curved is None else compute_insight(curved, given, self.setup())
+        """Compute what the key points of now are worth, in the thinker's process."""
+        with self._store.db.read() as session:
+            part = inputs.current(session, self._id, "part")
+            files = inputs.files_of(session, self._id, f"part:{part.version}")
+            seeds = tuple(inputs.seeds_in(session, self._id))
+        given = self.keypoints()
+        if not part.is_given:
+            return None
+        if not given.points:
+            return Insight(given.version)
+        settings = self._store.settings
+        content, setup = json.dumps(part.content), self.setup().model_dump_json()
+        arrays = files["part.npz"].sha256
+        question = Question(settings.store_url(), settings.workflow, arrays, content, setup, seeds, given)
+        return self._thinker.ask(think, question)
 
     def path(self, kind: PathKind) -> ToolPath | None:
         """Return a planned path, unless it is stale."""

@@ -98,7 +98,8 @@ def _made_steps(session: Session, pid: str, has_part: bool) -> list[Step]:
     had = sum(refusal is None for refusal in refusals)
     programs = Step(
         name="programs", state="done" if had == 2 else "attention" if had else paths.state if plan else "empty",
-        value={"available": had}, text=f"{had} of 2 can be downloaded", next="Run the alignment scan on the robot." if had else "",
+        value={"available": had}, text=f"{had} of 2 can be downloaded",
+        next="Run the alignment scan on the robot." if had else "",
     )  # fmt: skip
     taken = scans.all_scans(session, pid)
     fresh_plan = plan is not None and not changed_since(session, plan)

@@ -57,7 +57,7 @@ class ProcessSlot:
 
     def _ready(self) -> ProcessPoolExecutor:
         if self._pool is None:
-            self._pool = ProcessPoolExecutor(1, CONTEXT, _begin)
+            self._pool = ProcessPoolExecutor(1, CONTEXT, begin_worker)
         return self._pool
 
     def submit(self, payload: Payload) -> "Future[Outcome]":
@@ -99,7 +99,7 @@ class ProcessSlot:
             self._folder.rmdir()
 
 
-def _begin() -> None:
+def begin_worker() -> None:
     """Prepare a new worker: a process group of its own, and an end when the server ends, however that happens."""
     if POSIX:
         os.setsid()

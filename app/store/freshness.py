@@ -1,4 +1,4 @@
-"""Freshness: a result counts only while everything it was made from is what is in force now. Digests decide, nobody remembers."""
+"""Freshness: a result counts only while everything it was made from is in force. Digests decide, nobody remembers."""
 
 from typing import Any
 

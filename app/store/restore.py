@@ -21,7 +21,7 @@ MAX_MANIFEST_BYTES = 256 * CHUNK
 
 
 def restore(store: Store, source: IO[bytes]) -> ProjectRow:
-    """Make a project from an archive (a seekable file); raises Refusal 422 and leaves nothing behind if anything is wrong with it.
+    """Make a project from an archive (a seekable file); raises Refusal 422 if anything is wrong with it.
 
     Call it inside `store.busy()`: the blobs are stored before the rows that name them.
     """

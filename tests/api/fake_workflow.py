@@ -82,7 +82,9 @@ def plan(request: PlanRequest, progress):
     _obey(request.name, progress)
     points = list(request.keypoints) or suggest_keypoints(None, None)
     listed = [p.model_dump() for p in points]
-    text = json.dumps([request.setup.model_dump(mode="json"), listed, request.seeds_part, request.source.read_bytes().hex()[:64]])
+    text = json.dumps(
+        [request.setup.model_dump(mode="json"), listed, request.seeds_part, request.source.read_bytes().hex()[:64]]
+    )
     mark = hashlib.sha256(text.encode()).hexdigest()[:8].encode()
     program = PROGRAM.replace(b"END\r\n", b"; " + mark + b"\r\nEND\r\n")
     sha = hashlib.sha256(program).hexdigest()
@@ -90,9 +92,16 @@ def plan(request: PlanRequest, progress):
     programs = {f"{kind}/EB_TEST.src": program for kind in ("alignment", "inspection")}
     if "unreachable" in request.name:
         programs.pop("inspection/EB_TEST.src")
-        issues = [{"severity": "error", "code": "reach", "message": "out of reach.", "remedy": "Move it.", "where": "pass 1"}]
+        issues = [
+            {"severity": "error", "code": "reach", "message": "out of reach.", "remedy": "Move it.", "where": "pass 1"}
+        ]
     record = {"files": {"EB_TEST.src": {"sha256": "0" * 64 if "unproven" in request.name else sha}}}
-    content = {"keypoints": listed, "issues": issues, "alignment": {"program": record}, "inspection": {"program": record}}
+    content = {
+        "keypoints": listed,
+        "issues": issues,
+        "alignment": {"program": record},
+        "inspection": {"program": record},
+    }
     artifacts = {"plan.json": json.dumps(content).encode(), "keypoints.json": json.dumps(listed).encode()}
     progress(1.0, "planned")
     return None, artifacts | programs
@@ -109,9 +118,23 @@ def align(folder: Path, scans, options: AlignOptions, progress):
     verdict = next((v for v in ("fail", "partial") if f"want-{v}" in text), "pass")
     six = {"x_mm": 1.0, "y_mm": 0.0, "z_mm": 0.0, "a_deg": 0.0, "b_deg": 0.0, "c_deg": 0.0}
     sha = hashlib.sha256(PROGRAM).hexdigest()
-    issues = [{"severity": "error", "code": "bad", "message": "too far.", "remedy": "", "where": ""}] if verdict == "fail" else []
-    correction = {"verdict": verdict, "method": options.method, "correction": six, "keypoints": [], "issues": issues, "program": sha}
-    artifacts = {"correction/correction.json": json.dumps(correction).encode(), "correction/report.html": b"<p>report</p>"}
+    issues = (
+        [{"severity": "error", "code": "bad", "message": "too far.", "remedy": "", "where": ""}]
+        if verdict == "fail"
+        else []
+    )
+    correction = {
+        "verdict": verdict,
+        "method": options.method,
+        "correction": six,
+        "keypoints": [],
+        "issues": issues,
+        "program": sha,
+    }
+    artifacts = {
+        "correction/correction.json": json.dumps(correction).encode(),
+        "correction/report.html": b"<p>report</p>",
+    }
     if verdict != "fail":
         artifacts["corrected/EB_TEST.src"] = PROGRAM
     return SimpleNamespace(correction=correction, artifacts=artifacts)

@@ -10,7 +10,7 @@ from pathlib import Path
 
 
 def main() -> None:
-    from app.server import serve
+    from app.server import serve  # noqa: PLC0415 - the import is what takes long
 
     for line in sys.stdin:
         order = json.loads(line)

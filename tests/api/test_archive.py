@@ -64,7 +64,9 @@ def test_round_trip(client, archived):
     # What comes out of the copy is the same again, but for names and times.
     again = members(client.get(f"{copy}/archive").content)
     first = members(content)
-    assert {n: c for n, c in again.items() if n != "project.json"} == {n: c for n, c in first.items() if n != "project.json"}
+    assert {n: c for n, c in again.items() if n != "project.json"} == {
+        n: c for n, c in first.items() if n != "project.json"
+    }
     client.delete(copy)
     assert client.get(f"{address}/programs/corrected").status_code == 200
 
@@ -136,10 +138,13 @@ def hostile() -> dict[str, bytes]:
     bomb = packed({"project.json": b"{}", "plan-1/zeros": b"\0" * (64 * 2**20)})
     listed_bomb = packed({"project.json": b" " * (300 * 2**20)})
     return {
-        "empty": b"", "text": b"not a zip", "no list": packed({"a": b"b"}), "list of nothing": packed({"project.json": b"[]"}),
+        "empty": b"", "text": b"not a zip", "no list": packed({"a": b"b"}),
+        "list of nothing": packed({"project.json": b"[]"}),
         "list not JSON": packed({"project.json": b"{"}), "deep": packed({"project.json": b"[" * 200_000}),
-        "climbing": packed({"project.json": b"{}", "../../evil": b"x"}), "absolute": packed({"project.json": b"{}", "/evil": b"x"}),
-        "backslash": packed({"project.json": b"{}", "a\\..\\evil": b"x"}), "drive": packed({"project.json": b"{}", "C:evil": b"x"}),
+        "climbing": packed({"project.json": b"{}", "../../evil": b"x"}),
+        "absolute": packed({"project.json": b"{}", "/evil": b"x"}),
+        "backslash": packed({"project.json": b"{}", "a\\..\\evil": b"x"}),
+        "drive": packed({"project.json": b"{}", "C:evil": b"x"}),
         "link": with_link.getvalue(), "bomb": bomb, "bomb in the list": listed_bomb,
         "many": packed({f"f{i}": b"" for i in range(20_001)}, zipfile.ZIP_STORED),
     }  # fmt: skip
@@ -151,8 +156,8 @@ def crafted():
 
 
 @pytest.mark.parametrize("name", [
-    "empty", "text", "no list", "list of nothing", "list not JSON", "deep", "climbing", "absolute", "backslash", "drive", "link",
-    "bomb", "bomb in the list", "many",
+    "empty", "text", "no list", "list of nothing", "list not JSON", "deep", "climbing", "absolute", "backslash", "drive",
+    "link", "bomb", "bomb in the list", "many",
 ])  # fmt: skip
 def test_hostile_archives_are_refused(client, crafted, name):
     error_of(send(client, crafted[name]), 422)

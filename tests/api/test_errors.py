@@ -14,7 +14,8 @@ UNKNOWN = "/api/v1/projects/" + "0" * 20
     ("POST", f"{UNKNOWN}/plan", 404), ("POST", f"{UNKNOWN}/scans", 404), ("PUT", f"{UNKNOWN}/part", 404),
     ("GET", f"{UNKNOWN}/programs/alignment", 404), ("GET", f"{UNKNOWN}/programs/other", 422),
     ("GET", f"{UNKNOWN}/alignments/0", 422), ("GET", f"{UNKNOWN}/alignments/99999999999999999999", 422),
-    ("GET", "/api/v1/jobs/x", 404), ("DELETE", f"/api/v1/jobs/{'0' * 20}", 404), ("GET", f"/api/v1/jobs/{'0' * 20}/events", 404),
+    ("GET", "/api/v1/jobs/x", 404), ("DELETE", f"/api/v1/jobs/{'0' * 20}", 404),
+    ("GET", f"/api/v1/jobs/{'0' * 20}/events", 404),
     ("GET", f"{UNKNOWN}/events", 404), ("POST", "/api/v1/projects/import", 422), ("GET", f"/view/{'0' * 20}/", 404),
 ])  # fmt: skip
 def test_the_shape(client, method, path, status):
@@ -46,7 +47,9 @@ def test_every_bad_field_of_a_setup_is_listed(client):
         "body.standoff_mm", "body.probe.elements", "body.probe.colour", "body.tolerances.tilt_deg",
     }  # fmt: skip
     for number in ("NaN", "Infinity", "1e999"):
-        raw = client.put(f"{address}/setup", content=f'{{"standoff_mm": {number}}}', headers={"Content-Type": "application/json"})
+        raw = client.put(
+            f"{address}/setup", content=f'{{"standoff_mm": {number}}}', headers={"Content-Type": "application/json"}
+        )
         error_of(raw, 422)
 
 
@@ -66,7 +69,10 @@ def test_order_of_work_is_explained(client):
 def test_an_unreadable_or_unitless_part_changes_nothing(client):
     address = new_project(client)
     assert error_of(client.put(f"{address}/part", files={"file": ("a.stl", b"x")}), 422)["code"] == "unit-missing"
-    assert error_of(client.put(f"{address}/part", params={"name": "a.stp"}, content=b"broken"), 422)["code"] == "cad-broken"
+    assert (
+        error_of(client.put(f"{address}/part", params={"name": "a.stp"}, content=b"broken"), 422)["code"]
+        == "cad-broken"
+    )
     assert error_of(client.put(f"{address}/part", params={"unit": "foot"}, content=b"x"), 422)["code"] == "unit-unknown"
     assert client.get(f"{address}/part").json()["version"] == 1
 
@@ -82,7 +88,9 @@ def test_limits(client):
     # Without a Content-Length the limit is found on the way.
     answer = client.put(f"{address}/part", params={"unit": "mm"}, content=endless())
     error_of(answer, 413)
-    error_of(client.put(f"{address}/setup", content=b" " * (9 * 2**20), headers={"Content-Type": "application/json"}), 413)
+    error_of(
+        client.put(f"{address}/setup", content=b" " * (9 * 2**20), headers={"Content-Type": "application/json"}), 413
+    )
     many = [{"id": f"K{i}", "x_mm": 0, "y_mm": 0, "z_mm": 0} for i in range(10_001)]
     error_of(client.put(f"{address}/keypoints", json=many), 422)
     doubled = [{"id": "K", "x_mm": 0, "y_mm": 0, "z_mm": 0}] * 2
@@ -95,7 +103,7 @@ def test_limits(client):
     b'--x\r\nContent-Disposition: form-data; name="file"; filename="a.stl"\r\n\r\nabc',
     b'--x\r\nContent-Disposition: attachment; name="file"; filename="a.stl"\r\n\r\nabc\r\n--x--\r\n',
     b'--x\r\nContent-Disposition: form-data; filename="a.stl"\r\n\r\nabc\r\n--x--\r\n',
-    b'--x\r\nContent-Disposition: form-data; name="a"\r\nContent-Disposition: form-data; name="file"; filename="b"\r\n\r\nz\r\n--x--\r\n',
+    b'--x\r\nContent-Disposition: form-data; name="a"\r\nContent-Disposition: form-data; name="b"\r\n\r\nz\r\n--x--\r\n',
     b'--x\r\nContent-Disposition: form-data; name="unit"\r\n\r\n' + b"m" * 5000 + b"\r\n--x--\r\n",
     b"".join(b'--x\r\nContent-Disposition: form-data; name="f%d"\r\n\r\nv\r\n' % i for i in range(20)) + b"--x--\r\n",
 ])  # fmt: skip

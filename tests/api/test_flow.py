@@ -149,7 +149,9 @@ def test_two_files_make_one_scan(client):
 def test_two_people_on_one_project(client):
     address = new_project(client)
     mine = client.get(f"{address}/keypoints").headers["ETag"]
-    theirs = client.put(f"{address}/keypoints", json=[{"id": "A", "x_mm": 1, "y_mm": 1, "z_mm": 0}], headers={"If-Match": mine})
+    theirs = client.put(
+        f"{address}/keypoints", json=[{"id": "A", "x_mm": 1, "y_mm": 1, "z_mm": 0}], headers={"If-Match": mine}
+    )
     assert theirs.status_code == 200
     late = client.put(f"{address}/keypoints", json=[], headers={"If-Match": mine})
     assert error_of(late, 412)["code"] == "changed-meanwhile"

@@ -86,7 +86,9 @@ def test_a_websocket_of_our_own_page_reaches_the_view_and_an_unknown_project_doe
     async def first(name: str) -> bytes | int:
         url = server.url.replace("http", "ws") + f"/view/{name}"
         try:
-            async with websockets.connect(url, origin=server.url, subprotocols=protocol, proxy=None, max_size=None) as socket:
+            async with websockets.connect(
+                url, origin=server.url, subprotocols=protocol, proxy=None, max_size=None
+            ) as socket:
                 assert socket.subprotocol == protocol[0]
                 return await asyncio.wait_for(socket.recv(), 20)
         except websockets.InvalidStatus as refused:

@@ -17,7 +17,9 @@ MIB = 2**20
 def resident_mb(pid: int) -> tuple[float, float]:
     """Return the resident memory of a process, now and at its peak (MB)."""
     lines = Path(f"/proc/{pid}/status").read_text().splitlines()
-    values = {line.split(":")[0]: float(line.split()[1]) / 1024 for line in lines if line.startswith(("VmRSS", "VmHWM"))}
+    values = {
+        line.split(":")[0]: float(line.split()[1]) / 1024 for line in lines if line.startswith(("VmRSS", "VmHWM"))
+    }
     return values["VmRSS"], values["VmHWM"]
 
 
@@ -86,7 +88,8 @@ def test_nothing_acknowledged_is_lost_by_kills(tmp_path):
             address = client.post("/api/v1/projects", json={"name": "k"}).headers["Location"]
         stop, answered = threading.Event(), threading.Semaphore(0)
         threads = [
-            threading.Thread(target=_upload, args=(server.url, address, n, stop, answered, acknowledged, versions)) for n in range(3)
+            threading.Thread(target=_upload, args=(server.url, address, n, stop, answered, acknowledged, versions))
+            for n in range(3)
         ]
         for thread in threads:
             thread.start()
@@ -108,7 +111,12 @@ def test_nothing_acknowledged_is_lost_by_kills(tmp_path):
             for address, version in versions.items():
                 assert int(client.get(f"{address}/setup").headers["ETag"].strip('"')) >= version
                 assert client.get(f"{address}/journal").json()["intact"] is True
-            named = {f["sha256"] for a in {a for a, _, _ in acknowledged} for s in client.get(f"{a}/scans").json() for f in s["files"]}
+            named = {
+                f["sha256"]
+                for a in {a for a, _, _ in acknowledged}
+                for s in client.get(f"{a}/scans").json()
+                for f in s["files"]
+            }
         assert {p.name for p in (tmp_path / "blobs").glob("??/*")} == named
         assert len(acknowledged) > 20
     finally:

@@ -48,7 +48,10 @@ def test_a_blob_is_flushed_named_and_its_folder_flushed_in_this_order(store, mon
 
 def test_the_database_is_set_to_survive(store):
     with store.db.engine.connect() as connection:
-        read = {name: connection.exec_driver_sql(f"PRAGMA {name}").scalar() for name in ("journal_mode", "synchronous", "foreign_keys")}
+        read = {
+            name: connection.exec_driver_sql(f"PRAGMA {name}").scalar()
+            for name in ("journal_mode", "synchronous", "foreign_keys")
+        }
     assert read == {"journal_mode": "wal", "synchronous": 2, "foreign_keys": 1}
 
 
@@ -147,9 +150,14 @@ def test_blobs_of_running_work_are_not_swept(store):
 
 def test_a_failed_transaction_changes_nothing(store):
     project = projects.create(store, "a")
-    with pytest.raises(ZeroDivisionError), store.db.write() as session:
-        inputs.put_in(session, project.id, "keypoints", [], None)
-        raise ZeroDivisionError
+
+    def edit_and_fail() -> None:
+        with store.db.write() as session:
+            inputs.put_in(session, project.id, "keypoints", [], None)
+            raise ZeroDivisionError
+
+    with pytest.raises(ZeroDivisionError):
+        edit_and_fail()
     with store.db.read() as session:
         assert inputs.current(session, project.id, "keypoints").version == 0
 
@@ -167,7 +175,9 @@ def test_an_object_store_does_the_same(tmp_path):
         blobs.open(blob.sha256)
 
 
-@pytest.mark.parametrize("name", ["../a", "/a", "a/../b", "a//b", "", ".hidden", "a/.b", "a\\b", "a\n", "a" * 200, "a/b/c/d/e/f"])
+@pytest.mark.parametrize(
+    "name", ["../a", "/a", "a/../b", "a//b", "", ".hidden", "a/.b", "a\\b", "a\n", "a" * 200, "a/b/c/d/e/f"]
+)
 def test_results_cannot_name_places(name):
     assert not is_relative_name(name)
     assert not is_id(name)
