@@ -65,7 +65,7 @@ def export(
             "Accept it with a name and a reason.",
             "correction",
         )
-    accepted = (f"ACCEPTED {acceptance}",) if acceptance.strip() else ()
+    accepted = (f"ACCEPTANCE: {acceptance}",) if acceptance.strip() else ()
     program = build_program(
         path,
         setup,

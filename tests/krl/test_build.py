@@ -338,7 +338,7 @@ def test_verdicts():
         verdict="partial",
         acceptance="A. Person: Z and B suffice",
     )
-    assert ";NOTE ACCEPTED A. Person: Z and B suffice" in lines(made.files, "EB_JOB_C.src")
+    assert ";NOTE ACCEPTANCE: A. Person: Z and B suffice" in lines(made.files, "EB_JOB_C.src")
     assert made.manifest["acceptance"].startswith("A. Person")
 
 

@@ -1,0 +1,1 @@
+"""The steps behind `app.workflow`, one module each."""

@@ -1,0 +1,150 @@
+"""Steps 6 to 8 of the engineer's day: scan files to correction, corrected program and report."""
+
+import json
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from importlib.metadata import version
+from pathlib import Path
+from typing import Any, Literal
+
+import numpy as np
+
+from alignment.correction import Correction
+from alignment.estimate.align import align
+from alignment.metrics import expected
+from app.plan import Artifacts, Plan, load_plan
+from app.report.build import Deviation, ReportData, report_html
+from app.steps.corrections import last_correction
+from app.steps.programs import ExportedProgram, export_path, program_name
+from app.steps.scans import cloud_of, read_scans
+from planner.errors import EchoBaseError
+from planner.frames import Transform
+from planner.issues import Issue
+from planner.path.decimate import decimate
+from planner.placement import assume_nominal, corrected_base, part_from_correction
+
+Progress = Callable[[float, str], None]
+
+
+@dataclass(frozen=True)
+class AlignOptions:
+    """How to align. `T_base_active`: the correction in force when the scan was taken, for `base` "corrected"."""
+
+    method: Literal["map", "keypoints"] = "map"
+    edges: bool | None = None
+    non_rigid: bool = False
+    base: Literal["nominal", "corrected"] | None = None
+    last_correction: Transform | None = None
+
+    @classmethod
+    def from_folder(
+        cls,
+        folder: Path,
+        method: Literal["map", "keypoints"] = "map",
+        edges: bool | None = None,
+        non_rigid: bool = False,
+        base: Literal["nominal", "corrected"] | None = None,
+    ) -> "AlignOptions":
+        """Return options that remember the folder's last correction, since `align` replaces it."""
+        return cls(method, edges, non_rigid, base, last_correction(folder))
+
+
+@dataclass(frozen=True, eq=False)
+class Alignment:
+    """The outcome: correction.json as a dict, files to write, and the arrays behind the pictures."""
+
+    correction: dict[str, Any]
+    artifacts: Artifacts
+    issues: tuple[Issue, ...]
+    failed: bool
+    deviation: Deviation
+
+
+def run_align(folder: Path, scans: Sequence[Path], options: AlignOptions, progress: Progress) -> Alignment:
+    """Return the alignment. A verdict of fail is an answer (no program); raises EchoBaseError for unusable input."""
+    progress(0.02, "reading the plan")
+    plan = load_plan(folder)
+    progress(0.1, "reading the scan")
+    read = read_scans(scans)
+    setup = plan.setup
+    last = options.last_correction
+    cloud = cloud_of(read, setup, options.base, None if last is None else corrected_base(setup.T_world_base, last))
+    progress(0.3, "aligning")
+    found = align(cloud, plan.curved, plan.keypoints, setup, plan.inspection, options.method, options.edges)
+    content = found.to_json()
+    content["inputs"] = {
+        "part_sha256": plan.part.provenance.sha256,
+        "scan_sha256": [s.sha256 for s in read],
+        "plan_sha256": plan.sha256,
+        "version": version("echobase"),
+    }
+    program = None
+    if not found.failed:
+        progress(0.8, "writing the corrected program")
+        program = _corrected_program(plan, found, content)
+    progress(0.9, "writing the report")
+    artifacts: Artifacts = {
+        "correction/correction.json": (json.dumps(content, indent=1, allow_nan=False) + "\n").encode()
+    }
+    deviation = _deviation(plan, found)
+    artifacts["correction/report.html"] = report_html(
+        plan, _report_data(plan, found, content, deviation, program, [(s.name, s.sha256) for s in read])
+    )
+    if program:
+        artifacts |= program.files
+    progress(1.0, "aligned")
+    issues = tuple(Issue(**i) for i in content["issues"])
+    return Alignment(content, artifacts, issues, content["verdict"] == "fail", deviation)
+
+
+def _corrected_program(plan: Plan, found: Correction, content: dict[str, Any]) -> ExportedProgram | None:
+    """Return the corrected inspection program; if it cannot be written the verdict in `content` becomes fail."""
+    sent = decimate(plan.inspection)
+    notes = [f"verdict {content['verdict']}: {i.message}" for i in found.issues if i.severity != "info"]
+    accepted = "" if found.verdict == "pass" else "NOT GIVEN YET; THE VERDICT IS PARTIAL, READ THE REPORT FIRST"
+    try:
+        return export_path(
+            plan,
+            sent,
+            plan.inspection,
+            program_name(plan.part, "corrected"),
+            T_base_basecorr=found.T_base_basecorr,
+            notes=notes,
+            verdict=found.verdict,
+            acceptance=accepted,
+        )
+    except EchoBaseError as error:
+        content["verdict"] = "fail"
+        content["issues"] += [i.to_json() for i in error.issues]
+        return None
+
+
+def _deviation(plan: Plan, found: Correction) -> Deviation:
+    """Return the deviation map: each measured patch against the part where the plan believed it, and where it was found."""
+    if found.T_base_basecorr is None or not len(found.points_base):
+        return Deviation(np.zeros((0, 3)), np.zeros(0), np.zeros(0))
+    T_base_part = part_from_correction(found.T_base_basecorr, plan.setup.T_base_partnom)
+    on_part = plan.curved.closest(T_base_part.inv().points(found.points_base))
+    measured_base = found.points_base + found.deviation_mm[:, None] * T_base_part.directions(on_part.normals)
+    nominal = assume_nominal(plan.setup.T_base_partnom).inv()
+    before = plan.curved.closest(nominal.points(measured_base)).distance_mm
+    return Deviation(on_part.points, before, found.deviation_mm)
+
+
+def _report_data(
+    plan: Plan,
+    found: Correction,
+    content: dict[str, Any],
+    deviation: Deviation,
+    program: ExportedProgram | None,
+    scans: list[tuple[str, str]],
+) -> ReportData:
+    setup = plan.setup
+    T_nominal = assume_nominal(setup.T_base_partnom)
+    before = after = None
+    if found.T_base_basecorr is not None:
+        T_base_part = part_from_correction(found.T_base_basecorr, setup.T_base_partnom)
+        before = expected(plan.curved, plan.inspection, setup, T_base_part)
+        after = expected(plan.curved, plan.inspection, setup, T_nominal)
+    manifest = program.manifest if program else None
+    return ReportData(content, before, after, deviation, found.baseline_xyzabc, manifest, scans)

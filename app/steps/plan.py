@@ -1,0 +1,146 @@
+"""Step 3 to 5 of the engineer's day: surface, key points, both paths, both programs."""
+
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from alignment.estimate.predict import predict
+from app.plan import Artifacts, Plan, plan_artifacts
+from app.steps.programs import export_path, program_name
+from planner.cad import read_part
+from planner.checks import check
+from planner.errors import EchoBaseError
+from planner.issues import Issue, errors_in
+from planner.keypoint import KeyPoint
+from planner.part import Part
+from planner.path.alignment import alignment_path
+from planner.path.coverage import Coverage, coverage
+from planner.path.decimate import decimate
+from planner.path.keypoints import snap, suggest, verdicts
+from planner.path.raster import raster
+from planner.setup import Setup
+from planner.surface.curved import CurvedSurface, footprint_mm
+from planner.surface.facing import facing_issues
+from planner.surface.select import inspection_surface
+from planner.toolpath import ToolPath
+
+Progress = Callable[[float, str], None]
+SUGGESTED_SHARE = (0.10, 0.30)
+
+
+@dataclass(frozen=True)
+class PlanRequest:
+    """What to plan: a CAD file (`source`, called `name`, in `unit`), or a part already read; the setup; key points or seeds."""
+
+    source: Path | None
+    name: str
+    unit: str | None
+    setup: Setup
+    keypoints: tuple[KeyPoint, ...] = ()
+    seeds_part: tuple[tuple[float, float, float], ...] = ()
+    part: Part | None = None
+
+
+def run_plan(request: PlanRequest, progress: Progress) -> tuple[Plan, Artifacts]:
+    """Return the plan and its files; programs with an error-level issue are missing and the plan's issues say why."""
+    setup = request.setup
+    progress(0.02, "reading the part")
+    part = request.part
+    if part is None:
+        assert request.source is not None
+        part = read_part(request.source, request.name, request.unit)
+    progress(0.25, "finding the inspection surface")
+    seeds = [*request.seeds_part, *(k.xyz() for k in request.keypoints)]
+    up_part = setup.T_base_partnom.inv().directions([0.0, 0.0, 1.0])
+    surface = inspection_surface(part, seeds or None, up_part)
+    curved = CurvedSurface(surface, footprint_mm(setup.probe))
+    progress(0.35, "choosing key points")
+    keypoints = snap(curved, list(request.keypoints)) if request.keypoints else suggest(curved, setup)
+    issues = [*facing_issues(surface, up_part), *verdicts(curved, list(keypoints), setup)]
+    progress(0.5, "laying the alignment path")
+    alignment = alignment_path(curved, list(keypoints), setup)
+    progress(0.6, "laying the inspection raster")
+    inspection = raster(curved, setup)
+    progress(0.7, "measuring coverage")
+    covered = {p.kind: coverage(curved, p, setup) for p in (alignment, inspection)}
+    if not request.keypoints:
+        issues += _coverage_issues(covered["alignment"].swept_share)
+    progress(0.75, "predicting the accuracy")
+    prediction = predict(alignment, curved, setup)
+    summary: dict[str, Any] = {
+        "surface": {
+            "area_mm2": round(surface.area_mm2, 3),
+            "triangles": len(surface.part_faces),
+            "centroid_part_mm": [round(float(v), 4) for v in surface.centroid_part],
+        },
+        "prediction": prediction.to_json(),
+    }
+    # The surface's own part: a sheet that faced away from up was turned over.
+    plan = Plan(surface.part, surface, setup, tuple(keypoints), alignment, inspection, summary)
+    programs: Artifacts = {}
+    for share, path in ((0.8, alignment), (0.9, inspection)):
+        progress(share, f"checking and writing the {path.kind} program")
+        found, files, record = _checked_program(plan, path)
+        issues += found
+        programs |= files
+        summary[path.kind] = path_json(path, covered[path.kind]) | record
+    plan = replace(plan, issues=tuple(issues))
+    progress(1.0, "planned")
+    return plan, plan_artifacts(plan) | programs
+
+
+def _checked_program(plan: Plan, path: ToolPath) -> tuple[list[Issue], Artifacts, dict[str, Any]]:
+    """Return issues, files and the record for plan.json of one path; no files if anything is wrong with it."""
+    sent = decimate(path)
+    checked = check(plan.curved, sent, plan.setup)
+    issues = [replace(i, where=f"{path.kind}: {i.where}" if i.where else path.kind) for i in checked.issues]
+    record: dict[str, Any] = {"checks": checked.summary(), "program": None}
+    if errors_in(issues):
+        return issues, {}, record
+    try:
+        exported = export_path(plan, sent, path, program_name(plan.part, path.kind))
+    except EchoBaseError as error:
+        return issues + list(error.issues), {}, record
+    record["program"] = exported.manifest
+    return issues + list(exported.issues), exported.files, record
+
+
+def path_json(path: ToolPath, covered: Coverage) -> dict[str, Any]:
+    """Return what plan.json says of a path."""
+    data = path.is_data
+    xyz = path.Ts_part_tcp.xyz_mm
+    step = np.linalg.norm(np.diff(xyz, axis=0), axis=1)
+    along = data[1:] & data[:-1] & (path.pass_id[1:] == path.pass_id[:-1])
+    return {
+        "passes": path.passes,
+        "poses": len(path),
+        "data_poses": int(data.sum()),
+        "data_length_mm": round(float(step[along].sum()), 3),
+        "coverage": {
+            "area_mm2": covered.area_mm2,
+            "swept_mm2": covered.swept_mm2,
+            "share": covered.swept_share,
+            "within_tolerance_mm2": covered.within_tolerance_mm2,
+            "within_tolerance_share": covered.within_share,
+            "missed_mm2": covered.missed_mm2,
+            "margin_mm2": covered.margin_mm2,
+        },
+    }
+
+
+def _coverage_issues(share: float) -> list[Issue]:
+    low, high = SUGGESTED_SHARE
+    if low <= share <= high:
+        return []
+    return [
+        Issue(
+            "warning",
+            "coverage-outside",
+            f"the suggested alignment scan covers {share:.0%} of the surface, outside {low:.0%} to {high:.0%}.",
+            "Change alignment.coverage, or pick key points by hand.",
+            "alignment",
+        )
+    ]
