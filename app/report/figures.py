@@ -2,6 +2,7 @@
 
 import io
 from collections.abc import Sequence
+from typing import Any
 
 import matplotlib as mpl
 import numpy as np
@@ -13,7 +14,7 @@ from planner.frames import Array
 INK, ACCENT, MUTED = "#1c2733", "#0b6fa4", "#9aa7b4"
 MAX_MAP_POINTS = 20_000
 
-STYLE = {
+STYLE: Any = {
     "svg.fonttype": "none",
     "svg.hashsalt": "echobase",  # the same figure is the same bytes
     "font.family": "sans-serif",
@@ -28,7 +29,7 @@ STYLE = {
 }
 
 
-def histogram_svg(before: Array, after: Array, label: str, limits: tuple[float, float] | None = None) -> str:
+def histogram_svg(before: Array, after: Array, label: str, limits: tuple[float, ...] = ()) -> str:
     """Return two overlaid histograms of the same quantity; `limits` are drawn as tolerance lines."""
     before, after = before[np.isfinite(before)], after[np.isfinite(after)]
     both = np.concatenate([before, after])
@@ -38,10 +39,10 @@ def histogram_svg(before: Array, after: Array, label: str, limits: tuple[float, 
         if both.size:
             low, high = float(both.min()), float(both.max())
             pad = max(1e-3, 0.02 * (high - low))
-            bins = np.linspace(low - pad, high + pad, 61)
+            bins = np.linspace(low - pad, high + pad, 61).tolist()
             axes.hist(before, bins, color=MUTED, alpha=0.75, label="before")
             axes.hist(after, bins, color=ACCENT, alpha=0.85, label="after")
-        for value in limits or ():
+        for value in limits:
             axes.axvline(value, color=INK, linewidth=0.8, linestyle=(0, (4, 3)))
         axes.set_xlabel(label)
         axes.set_ylabel("poses")
@@ -76,7 +77,7 @@ def map_svg(points_uv: Array, values: Array, label: str, limit: float, outline: 
         axes.set_ylabel("across (mm)")
         bar = figure.colorbar(drawn, ax=axes, shrink=0.9, pad=0.02)
         bar.set_label(label)
-        bar.outline.set_linewidth(0.5)  # type: ignore[operator]
+        bar.outline.set_linewidth(0.5)
         return _svg(figure)
 
 

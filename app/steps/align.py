@@ -82,6 +82,7 @@ def run_align(folder: Path, scans: Sequence[Path], options: AlignOptions, progre
     if not found.failed:
         progress(0.8, "writing the corrected program")
         program = _corrected_program(plan, found, content)
+        content["program"] = program.manifest if program else None
     progress(0.9, "writing the report")
     artifacts: Artifacts = {
         "correction/correction.json": (json.dumps(content, indent=1, allow_nan=False) + "\n").encode()

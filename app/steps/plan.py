@@ -58,10 +58,10 @@ def run_plan(request: PlanRequest, progress: Progress) -> tuple[Plan, Artifacts]
     surface = inspection_surface(part, seeds or None, up_part)
     curved = CurvedSurface(surface, footprint_mm(setup.probe))
     progress(0.35, "choosing key points")
-    keypoints = snap(curved, list(request.keypoints)) if request.keypoints else suggest(curved, setup)
-    issues = [*facing_issues(surface, up_part), *verdicts(curved, list(keypoints), setup)]
+    keypoints = snap(curved, request.keypoints) if request.keypoints else suggest(curved, setup)
+    issues = [*facing_issues(surface, up_part), *verdicts(curved, keypoints, setup)]
     progress(0.5, "laying the alignment path")
-    alignment = alignment_path(curved, list(keypoints), setup)
+    alignment = alignment_path(curved, keypoints, setup)
     progress(0.6, "laying the inspection raster")
     inspection = raster(curved, setup)
     progress(0.7, "measuring coverage")

@@ -90,7 +90,8 @@ def active_base(reading: KrlReading, setup: Setup) -> Transform:
 
     An untaught base is taken to be world, as everywhere else in the plan.
     """
-    assigned = reading.base_data.get(reading.base_number)
+    number = reading.base_number
+    assigned = None if number is None else reading.base_data.get(number)
     T_world_base = Transform.from_xyzabc("world", "base", assigned) if assigned is not None else setup.T_world_base
     if reading.base_offset is None:
         return T_world_base

@@ -2,7 +2,7 @@
 
 import argparse
 from pathlib import Path
-from typing import Any
+from typing import Any, Literal
 
 from app import workflow
 from app.cli.commands.align import pose_line, say_correction
@@ -61,7 +61,11 @@ def _align(args: argparse.Namespace, folder: Path, chosen: Sample) -> workflow.A
 
 def _inspect_before_and_after(args: argparse.Namespace, folder: Path, chosen: Sample) -> dict[str, Any]:
     """Rehearse the nominal and the corrected inspection and judge the scans."""
-    for seed, (path, name) in enumerate((("inspection", "before"), ("corrected", "after")), start=2):
+    runs: tuple[tuple[Literal["inspection", "corrected"], str], ...] = (
+        ("inspection", "before"),
+        ("corrected", "after"),
+    )
+    for seed, (path, name) in enumerate(runs, start=2):
         options = workflow.SimulateOptions(chosen.hidden_offset, seed=seed, path=path)
         workflow.simulate(folder, options, folder / "scans" / f"{name}.csv", progress_printer(args))
     judged = workflow.assess(
