@@ -2,6 +2,8 @@
 
 from hypothesis import HealthCheck, settings
 
+import app  # noqa: F401 - sets the number of BLAS threads before numpy is imported
+
 settings.register_profile(
     "echobase",
     derandomize=True,
