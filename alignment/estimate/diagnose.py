@@ -20,6 +20,8 @@ FITS_MM = 0.4
 BETTER = 0.5
 # Of a scan that fits far from nominal, one that fits nearly as well and near is the likelier.
 NEARLY = 2.5
+# Farther than this from nominal, in standard deviations of the fixture, is no explanation.
+LIKELY = 4.0
 # A fit with this robust scatter (mm) is suspicious, and so is one with so few readings on the surface.
 SUSPICIOUS_MM = 0.3
 SUSPICIOUS_SHARE = 0.5
@@ -99,7 +101,11 @@ def _best(
         found = capture(hypothesis.apply(small), problem)
         if not found.converged or found.valid_share < FITS_SHARE or found.scatter_mm > FITS_MM:
             continue
-        near = far and float(np.abs(problem.total(found.T_base_part)).max()) < 2.0
+        away = float(np.abs(problem.total(found.T_base_part)).max())
+        # Poses that follow the part fit it wherever they are put along the normal: an explanation must be likely, too.
+        if away > LIKELY:
+            continue
+        near = far and away < 2.0
         wanted = NEARLY * scatter_mm if near else BETTER * scatter_mm
         if found.scatter_mm < min(best, wanted):
             best, chosen = found.scatter_mm, hypothesis
@@ -120,7 +126,7 @@ def speed_issues(found: MapFit, problem: Problem) -> list[Issue]:
         return []
     x, r = np.column_stack([design, d]), found.rows.r[used]
     # Neighbouring patches share the robot's error: as many count as one as there are in its correlation length, both ways.
-    shared = max(5.0, 8.0 * found.noise.named()["path_length_mm"] / 8.0)
+    shared = float(np.clip(found.noise.named()["path_length_mm"], 5.0, 40.0))
     variance = shared * mad_sigma(r, 0.01, about_zero=True) ** 2
     information = x.T @ x / variance + np.diag(np.r_[np.ones(6), 1e-6])
     scale = -np.linalg.solve(information, x.T @ r / variance)[6]

@@ -29,6 +29,8 @@ CELL_MM = 8.0
 MOST_CELLS = 30_000
 SOLVE_STEPS = 10
 SOLVED_MM = 2e-5
+# A step this long (mm), after the capture, is the data pulling against a lock that cannot hold.
+RUNAWAY_MM = 30.0
 # Directions turn with the part as held ones go back to nominal; they are judged again where it came to rest.
 ROUNDS = 2
 # Noise models that are enough to step with; the last round takes them all.
@@ -139,7 +141,7 @@ def _solve(state: State, system: System, mix: Mixture, held: Array) -> Posterior
     rows = system.rows(state.T_base_part, state.nuisance)
     z = np.r_[system.problem.total(state.T_base_part), state.nuisance]
     wide = np.vstack([held, np.zeros((system.unknowns - 6, held.shape[1]))])
-    return solve(mix, rows.r, z, wide)
+    return solve(mix, rows.r, z, wide, system.problem.off_nominal(state.T_base_part, held))
 
 
 def _settle(state: State, system: System, mix: Mixture, held: Array) -> tuple[State, bool]:
@@ -148,6 +150,8 @@ def _settle(state: State, system: System, mix: Mixture, held: Array) -> tuple[St
     for _ in range(SOLVE_STEPS):
         step = _solve(state, system, mix, held).step
         moves = system.problem.moves_mm(step[:6])
+        if not moves < RUNAWAY_MM:
+            return state, False
         state = State(system.problem.step(state.T_base_part, step[:6]), state.nuisance + step[6:])
         if moves < SOLVED_MM:
             break

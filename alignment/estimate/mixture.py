@@ -58,14 +58,15 @@ def mixture(rows: NoiseRows, fit: NoiseFit, most: int | None = None) -> Mixture:
     return Mixture(w / w.sum(), np.array(solved), np.array(information))
 
 
-def solve(mix: Mixture, r: Array, z: Array, held: Array) -> Posterior:
+def solve(mix: Mixture, r: Array, z: Array, held: Array, values: Array | None = None) -> Posterior:
     """Return the posterior of unknowns that stand at z (k,) with residuals r (n,).
 
     held (k, h): orthonormal directions whose component of z + step is exactly zero; the rest is solved with them fixed.
+    values (h,): how far off nominal they stand, if that is better known than held' z.
     """
     k = mix.unknowns
     free = complement(held, k)
-    back = -held @ (held.T @ z)
+    back = -held @ (held.T @ z if values is None else values)
     steps, covariance = np.zeros((len(mix.weights), k)), np.zeros((k, k))
     for i, w in enumerate(mix.weights):
         info = mix.information[i]

@@ -5,6 +5,7 @@ T_new = Tr(c) Exp(xi) Tr(-c) T. The six-vector is rotation first, Exp is that of
 """
 
 import numpy as np
+from numpy.typing import NDArray
 from scipy.spatial.transform import Rotation
 
 from planner.frames import Array, Transform
@@ -52,7 +53,7 @@ def _cross_matrix(v: Array) -> Array:
     return np.array([[0.0, -z, y], [z, 0.0, -x], [-y, x, 0.0]])
 
 
-def area_moments(vertices: Array, faces: Array, areas: Array) -> Array:
+def area_moments(vertices: Array, faces: NDArray[np.int32], areas: Array) -> Array:
     """Return the second moment (3, 3) of a triangulated area about its centroid, mm2 (per unit area)."""
     corners = vertices[faces]
     share = areas / areas.sum()

@@ -72,7 +72,23 @@ class Problem:
         m = named_axes(self.T_base_basecorr(T_base_part), self.centre_mm(T_base_part))
         return m * self.prior_sigma
 
+    @property
+    def locked(self) -> list[int]:
+        """Numbers of the axes x, y, z, a, b, c that the user locks."""
+        return [AXES.index(name) for name in dict.fromkeys(self.setup.alignment.lock)]
+
     def lock_rows(self, T_base_part: Transform) -> Array:
         """Return the rows (k, 6) of `axes_of` that the user locks."""
-        index = [AXES.index(name) for name in dict.fromkeys(self.setup.alignment.lock)]
-        return self.axes_of(T_base_part)[index]
+        return self.axes_of(T_base_part)[self.locked]
+
+    def off_nominal(self, T_base_part: Transform, held: Array) -> Array:
+        """Return how far off nominal held directions (6, h) stand (h,): for locked axes, which come first, exactly."""
+        values = held.T @ self.total(T_base_part)
+        index = self.locked
+        if index and held.shape[1]:
+            found = self.T_base_basecorr(T_base_part).xyzabc
+            six = np.r_[found[:3], np.radians(found[3:])][index]
+            rows = self.lock_rows(T_base_part)
+            m = int(np.linalg.matrix_rank(rows))
+            values[:m] = np.linalg.lstsq(rows @ held[:, :m], six)[0]
+        return values
