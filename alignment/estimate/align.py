@@ -4,6 +4,7 @@ from collections.abc import Sequence
 from dataclasses import replace
 
 import numpy as np
+from numpy.typing import NDArray
 
 from alignment.cloud import PointCloud
 from alignment.correction import AxisResult, Correction, Method, Residual
@@ -77,7 +78,7 @@ def _finish(
     found: tuple,
     patches: Patches,
     rows: Rows,
-    used: Array,
+    used: NDArray[np.bool_],
     keyed: tuple[KeyPointMatch, ...],
     issues: list[Issue],
     inspection: ToolPath | None,
@@ -127,7 +128,7 @@ def _finish(
     )
 
 
-def residual_of(patches: Patches, rows: Rows, used: Array) -> Residual:
+def residual_of(patches: Patches, rows: Rows, used: NDArray[np.bool_]) -> Residual:
     """Return the residuals of the readings that the estimate rests on: patch means and the scatter within them."""
     picked = np.flatnonzero(used)
     if len(picked) == 0:
@@ -147,7 +148,9 @@ def _baseline(problem: Problem, baseline: KeyPointFit | None) -> Transform | Non
     return problem.T_base_basecorr(baseline.T_base_part)
 
 
-def _with_residual(match: KeyPointMatch, patches: Patches, rows: Rows, used: Array, setup: Setup) -> KeyPointMatch:
+def _with_residual(
+    match: KeyPointMatch, patches: Patches, rows: Rows, used: NDArray[np.bool_], setup: Setup
+) -> KeyPointMatch:
     """Return the match with the mean residual, along the normal, of the patches around it."""
     if not used.any():
         return match
@@ -201,7 +204,7 @@ def _keypoint_covariance(good: list[KeyPointMatch], problem: Problem, T: Transfo
         information += x.T @ x / radius**2
     x = motion_rows(points, normals, problem.centre_mm(T)) * problem.prior_sigma
     information += x.T @ x * (1.0 / sigma_mm**2 - 1.0 / radius**2)
-    return np.linalg.inv(information)
+    return np.asarray(np.linalg.inv(information))
 
 
 def _nothing(

@@ -3,13 +3,14 @@
 from dataclasses import dataclass
 
 import numpy as np
+from numpy.typing import NDArray
 
 from alignment.cloud import PointCloud
 from alignment.estimate.patches import model_readings, reading_weights
 from alignment.estimate.problem import Problem
 from alignment.estimate.robust import huber_weights, mad_sigma, tukey_weights
 from alignment.estimate.surface_rows import distance_rows
-from planner.frames import Array, Transform
+from planner.frames import Transform
 
 SAMPLE = 3000
 CONVEX_STEPS = 5
@@ -34,7 +35,7 @@ class Captured:
     inlier_share: float
 
 
-def sample_rows(n: int, size: int = SAMPLE) -> Array:
+def sample_rows(n: int, size: int = SAMPLE) -> NDArray[np.int64]:
     """Return at most `size` row numbers spread over n rows, always the same ones.
 
     The step is irrational to the rhythm of laws and poses (golden ratio), so that no law is favoured.
@@ -71,7 +72,7 @@ def capture(cloud: PointCloud, problem: Problem, start: Transform | None = None,
         inlier_share = float((np.abs(r) < 4.0 * sigma).mean())
         weight = heard[use] * robust / READING_SIGMA_MM**2
         normal = (x * weight[:, None]).T @ x + np.eye(6)
-        z = np.linalg.solve(normal, -(x * weight[:, None]).T @ r - problem.total(T))
+        z = np.asarray(np.linalg.solve(normal, -(x * weight[:, None]).T @ r - problem.total(T)))
         T = problem.step(T, z)
         if i >= CONVEX_STEPS and problem.moves_mm(z) < 0.2 * FLOOR_MM:
             converged = True

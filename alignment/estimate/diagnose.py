@@ -127,7 +127,8 @@ def speed_issues(found: MapFit, problem: Problem) -> list[Issue]:
     x, r = np.column_stack([design, d]), found.rows.r[used]
     # Neighbouring patches share the robot's error: as many count as one as there are in its correlation length, both ways.
     shared = float(np.clip(found.noise.named()["path_length_mm"], 5.0, 40.0))
-    variance = shared * mad_sigma(r, 0.01, about_zero=True) ** 2
+    left = r - x @ np.linalg.lstsq(x, r, rcond=None)[0]
+    variance = shared * mad_sigma(left, 0.01, about_zero=True) ** 2
     information = x.T @ x / variance + np.diag(np.r_[np.ones(6), 1e-6])
     scale = -np.linalg.solve(information, x.T @ r / variance)[6]
     deviation = float(np.sqrt(np.linalg.inv(information)[6, 6]))

@@ -2,6 +2,7 @@
 
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass, replace
+from functools import partial
 
 import numpy as np
 
@@ -52,7 +53,7 @@ def array_hypotheses(setup: Setup) -> Iterator[Hypothesis]:
             "array-turned",
             f"the readings fit the part only with the array turned by {name} deg about the beam.",
             "Correct tool.array_axis, or the angle A of the taught tool.",
-            lambda c, s=sign: _along(c, setup, lambda a, b: s * np.cross(b, a)),
+            partial(_quarter, setup=setup, sign=sign),
         )
 
 
@@ -69,21 +70,21 @@ def place_hypotheses(setup: Setup) -> Iterator[Hypothesis]:
             f"poses-in-{name}",
             f"the poses of the scan are in {name}, not in BASE.",
             "Export the poses in the BASE that was active, or give that BASE in the base_* columns.",
-            lambda c, t=step: _moved(c, t),
+            partial(_moved, T=step),
         )
     for name, scale in LENGTH_SCALES:
         yield Hypothesis(
             "poses-unit",
             f"the positions of the scan are in {name}, not in mm.",
             f"Multiply x, y and z by {scale:g}.",
-            lambda c, s=scale: _scaled(c, setup, s),
+            partial(_scaled, setup=setup, scale=scale),
         )
     for name, scale in TIME_SCALES:
         yield Hypothesis(
             "tof-unit",
             f"the time of flight is in {name}, not in microseconds there and back.",
             f"Multiply it by {scale:g}.",
-            lambda c, s=scale: replace(c, distance_mm=s * c.distance_mm),
+            partial(_slower, scale=scale),
         )
     yield Hypothesis(
         "beam-reversed",
@@ -100,6 +101,14 @@ def _along(cloud: PointCloud, setup: Setup, turned: Callable[[Array, Array], Arr
     x = law_offsets_mm(setup.probe)[cloud.law - 1][:, None]
     other = turned(cloud.arrays_base, cloud.beams_base)
     return replace(cloud, origins_base=cloud.origins_base + x * (other - cloud.arrays_base), arrays_base=other)
+
+
+def _quarter(cloud: PointCloud, setup: Setup, sign: float) -> PointCloud:
+    return _along(cloud, setup, lambda a, b: sign * np.cross(b, a))
+
+
+def _slower(cloud: PointCloud, scale: float) -> PointCloud:
+    return replace(cloud, distance_mm=scale * cloud.distance_mm)
 
 
 def _moved(cloud: PointCloud, T: Transform) -> PointCloud:

@@ -126,15 +126,15 @@ def _match(name: str, place: Array, normal: Array, points: Array, cloud: PointCl
             q = cloud.origins_base[near] - distance[:, None] * plane
             plane = _plane_normal(q, normal)
     dot = float(np.clip(plane @ normal, -1.0, 1.0))
-    reason = None
+    refusal: str | None = None
     if amplitude < settings.min_amplitude_pct:
-        reason = f"mean amplitude {amplitude:.1f} % is below {settings.min_amplitude_pct:g} %"
+        refusal = f"mean amplitude {amplitude:.1f} % is below {settings.min_amplitude_pct:g} %"
     elif dot < settings.min_normal_dot:
-        reason = f"the readings' plane is turned by {np.degrees(np.arccos(dot)):.2f} deg from the CAD normal"
+        refusal = f"the readings' plane is turned by {np.degrees(np.arccos(dot)):.2f} deg from the CAD normal"
     return KeyPointMatch(
         name,
-        "matched" if reason is None else "rejected",
-        reason,
+        "matched" if refusal is None else "rejected",
+        refusal,
         *at,  # type: ignore[arg-type]
         readings=len(near),
         amplitude_pct=amplitude,

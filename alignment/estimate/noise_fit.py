@@ -117,7 +117,7 @@ def _stretch(kernel: Kernel, rows: NoiseRows, prior: NoisePrior, theta: Array, r
 def factor(k: Array) -> Array | None:
     """Return the lower Cholesky factor, or None if K is not positive definite to rounding."""
     try:
-        return np.linalg.cholesky(k)
+        return np.asarray(np.linalg.cholesky(k), dtype=np.float64)
     except np.linalg.LinAlgError:
         return None
 
@@ -176,7 +176,7 @@ def _mode(kernel: Kernel, rows: NoiseRows, prior: NoisePrior, theta: Array) -> A
         if at is None or damping > 1e4:
             break
         gradient, information = at
-        step = np.linalg.solve(information + damping * np.diag(np.diag(information)), gradient)
+        step = np.asarray(np.linalg.solve(information + damping * np.diag(np.diag(information)), gradient))
         step *= min(1.0, 1.5 / max(float(np.abs(step).max()), 1e-12))
     return here
 

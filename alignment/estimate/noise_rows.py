@@ -106,7 +106,7 @@ def noise_rows(patches: Patches, rows: Rows, used: NDArray[np.bool_], prior_sigm
     return NoiseRows(
         mean(rows.r[picked]),
         mean(rows.jacobian[picked] * prior_sigma),
-        total,
+        np.asarray(total, dtype=np.float64),
         block.astype(np.int32),
         mean(patches.cells.across_mm[picked]) / max(0.5 * swath_mm, 1e-9),
         mean(rows.foot_base[picked]),
@@ -139,7 +139,7 @@ def _without_path(patches: Patches, rows: Rows, used: NDArray[np.bool_], prior_s
     return NoiseRows(
         mean(rows.r[picked])[:, 0],
         mean(rows.jacobian[picked] * prior_sigma),
-        total,
+        np.asarray(total, dtype=np.float64),
         np.full(n, -1, dtype=np.int32),
         np.zeros(n),
         mean(points),

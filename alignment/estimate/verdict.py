@@ -3,6 +3,7 @@
 from collections.abc import Sequence
 
 import numpy as np
+from numpy.typing import NDArray
 
 from alignment.estimate.directions import Direction
 from alignment.estimate.motion import moved
@@ -121,7 +122,9 @@ def harm_of(
     return None
 
 
-def _tilt_and_standoff(curved: CurvedSurface, Ts_part_tcp: Transform, setup: Setup) -> tuple[Array, Array, Array]:
+def _tilt_and_standoff(
+    curved: CurvedSurface, Ts_part_tcp: Transform, setup: Setup
+) -> tuple[Array, Array, NDArray[np.bool_]]:
     foot = curved.closest(Ts_part_tcp.xyz_mm)
     beam = Ts_part_tcp.rotation_matrix[:, :, 2]
     cosine = -np.einsum("ij,ij->i", beam, foot.normals)
