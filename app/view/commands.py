@@ -62,5 +62,7 @@ class ViewState(Strict):
     keypoints: int = 0
     version: int = 0
     clients: int = 0
+    insight: dict[str, Any] | None = None
+    """What the key points of now are worth, as in the event `insight`; null while it is computed."""
     pick_ms: float | None = None
     """Time the server took for the last pick, ms."""

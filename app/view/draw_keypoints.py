@@ -31,8 +31,9 @@ def marks(points: Sequence[KeyPoint], insight: Insight | None, found: Found | No
     worst: dict[str, tuple[int, str]] = {}
     for issue in insight.issues if insight else ():
         rank = {"error": 2, "warning": 1}.get(issue.severity, 0)
-        if rank > worst.get(issue.where, (0, ""))[0]:
-            worst[issue.where] = (rank, short(issue.code))
+        name = issue.where.rsplit(" ", 1)[-1]
+        if rank > worst.get(name, (0, ""))[0]:
+            worst[name] = (rank, short(issue.code))
     for point in points:
         status = (found.keypoint_status.get(point.id) if found else None) or None
         if status is not None:

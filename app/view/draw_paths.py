@@ -14,8 +14,8 @@ from planner.frames import Array
 from planner.setup import Setup
 from planner.toolpath import Role, ToolPath
 
-MAX_ARROWS = 240
-MAX_BEAMS = 160
+MAX_ARROWS = 110
+MAX_BEAMS = 70
 MAX_SEGMENTS = 60_000
 
 
@@ -43,7 +43,9 @@ def draw_path(
     normal = contact.rotation_matrix[:, :, 2]
     lifted = contact.xyz_mm + normal * size_mm * 1.2e-3
     data = p.is_data[1:] & p.is_data[:-1] & (p.pass_id[1:] == p.pass_id[:-1])
-    lines(server, f"{node}/data", np.stack([lifted[:-1], lifted[1:]], axis=1)[data], rgb, 2.4)
+    # Many passes close together must stay lines, not become a sheet.
+    width = 2.4 if p.passes <= 12 else 1.3
+    lines(server, f"{node}/data", np.stack([lifted[:-1], lifted[1:]], axis=1)[data], rgb, width)
     tcp_xyz = tcp.xyz_mm
     lines(server, f"{node}/links", np.stack([tcp_xyz[:-1], tcp_xyz[1:]], axis=1)[~data], colour.FAINT, 1.0)
     on = np.flatnonzero(p.is_data)

@@ -32,7 +32,7 @@ STEPS: dict[str, tuple[str, ...]] = {
     "cell": ("axes", "cad"),
     "surface": ("cad", "surface"),
     "keypoints": ("cad", "surface", "coverage", "keypoints"),
-    "paths": ("cad", "inspection", "keypoints", "probe"),
+    "paths": ("cad", "inspection", "probe"),
     "programs": ("cad", "alignment", "keypoints"),
     "scan": ("cad", "keypoints", "scan"),
     "alignment": ("found", "after", "keypoints"),

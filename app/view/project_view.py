@@ -102,6 +102,8 @@ class ProjectView:
             and len(path)
         ):
             probe = probe_facts(path, probe_index(path, browser.probe[1]), self.model.setup(), browser.probe[0])[1]
+        insight = self.stage.insight
+        fresh = insight if insight is not None and insight.version == keypoints.version else None
         return ViewState(
             client=browser.client.client_id if browser else None,
             step=browser.step if browser else "part",
@@ -115,6 +117,7 @@ class ProjectView:
             keypoints=len(keypoints.points),
             version=keypoints.version,
             clients=len(self.browsers),
+            insight=insight_json(fresh) if fresh is not None else None,
             pick_ms=self.clicks.last_ms,
         )
 
@@ -136,6 +139,9 @@ class ProjectView:
     def _arrange(self, browser: Browser, command: ViewCommand) -> None:
         if command.step is not None:
             browser.turn_to(command.step)
+            if command.step in {"alignment", "report"} and self.stage.found is None:
+                # Nothing was found (yet): what there is to see is the part and the scan.
+                browser.shown = {"cad", "keypoints", "scan"}
         for name, on in (command.layers or {}).items():
             if name in LAYERS:
                 (browser.shown.add if on else browser.shown.discard)(name)

@@ -74,6 +74,12 @@ export class Shell {
   }
 
   afterView() {
+    const { insight } = this.view.state;
+    if (insight && insight.version !== this.project?.data.insight?.version) {
+      this.project.data.insight = insight;
+      this.draw();
+      return;
+    }
     if (this.inspector?.watchesView) this.draw();
   }
 

@@ -13,7 +13,8 @@ from tests.browser import journey
 from tests.browser.eyes import Watch, bluish, picture, until
 from tests.browser.real_server import RealServer
 
-pytestmark = [pytest.mark.browser, pytest.mark.slow]
+# A software renderer on busy cores takes its time.
+pytestmark = [pytest.mark.browser, pytest.mark.slow, pytest.mark.timeout(900)]
 OFFSET = {"x": "1.1", "y": "-0.7", "z": "1.0", "a": "0.2", "b": "-0.8", "c": "0.5"}
 
 

@@ -9,7 +9,8 @@ import pytest
 from tests.browser.eyes import bluish, picture, project, reddish, until
 from tests.view.memory import height
 
-pytestmark = [pytest.mark.browser, pytest.mark.slow]
+# A software renderer on busy cores takes its time.
+pytestmark = [pytest.mark.browser, pytest.mark.slow, pytest.mark.timeout(900)]
 SIZE = {"width": 760, "height": 460}
 
 

@@ -17,7 +17,7 @@ function plotly() {
 const css = (name) => getComputedStyle(document.documentElement).getPropertyValue(name).trim();
 const axis = (title, more = {}) => ({ title: { text: title, font: { size: 11 } }, zeroline: false, gridcolor: "#e7eaed", linecolor: "#c3c9ce", tickfont: { size: 11 }, ...more });
 const layout = (title, x, y, more = {}) => ({
-  title: { text: title, font: { size: 12 }, x: 0.02, xanchor: "left", y: 0.99, yanchor: "top", pad: { t: 6 } }, margin: { l: 48, r: 14, t: 30, b: 38 }, showlegend: false,
+  title: { text: title, font: { size: 12 }, x: 0.02, xanchor: "left", y: 0.99, yanchor: "top", pad: { t: 14 } }, margin: { l: 48, r: 14, t: 30, b: 38 }, showlegend: false,
   font: { family: css("--font"), color: css("--ink-2"), size: 11 }, paper_bgcolor: "rgba(0,0,0,0)", plot_bgcolor: "rgba(0,0,0,0)", xaxis: x, yaxis: y, bargap: 0.04, ...more,
 });
 const config = { displaylogo: false, displayModeBar: false, responsive: true };

@@ -39,11 +39,14 @@ export function directions(body, list) {
   ], list));
 }
 
+/** True if an issue is about a key point: its place ends with the name. */
+export const isOf = (issue, id) => issue.where === id || issue.where?.endsWith(` ${id}`);
+
 /** Key points as they are planned: a click looks at one, a cross deletes it. */
 export function planned(body, keypoints, insight, focus, remove) {
   if (!keypoints?.length) return fill(body, h("p", { class: "nothing" }, "No key points yet. Click on the tinted surface, or let EchoBase suggest some."));
   const worst = (id) => {
-    const mine = (insight?.issues ?? []).filter((i) => i.where === id);
+    const mine = (insight?.issues ?? []).filter((i) => isOf(i, id));
     return mine.find((i) => i.severity === "error") ?? mine.find((i) => i.severity === "warning");
   };
   const verdict = (k) => {

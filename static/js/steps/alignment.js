@@ -20,11 +20,12 @@ export function content(shell) {
   const [word, text] = WORDS[a.verdict] ?? [a.verdict, ""];
   return [
     a.stale ? verdict("warn", "Out of date", `Changed since: ${a.stale_because.join(", ")}.`) : a.accepted ? verdict("good", "Accepted", `By ${a.accepted.name}: ${a.accepted.reason}`) : verdict(toneOf(a.verdict), word, text),
+    a.verdict !== "pass" && issueList(a.issues, 8),
     correction(a, setup, hidden(shell)),
     layers(shell, local),
     before(a),
     facts([["Residual, rms", mm(a.residual?.rms_mm), "mm"], ["Residual, 95 %", mm(a.residual?.p95_mm), "mm"], ["Readings used", whole(a.residual?.readings)], ["Method", h("span", {}, a.method === "map" ? "MAP, all readings" : "key points (paper)")]]),
-    issueList(a.issues, 8),
+    a.verdict === "pass" && issueList(a.issues, 8),
     options(shell, local),
   ];
 }

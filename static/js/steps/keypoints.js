@@ -2,7 +2,7 @@
 
 import { post } from "../api.js";
 import { button, h } from "../dom.js";
-import { planned } from "../drawer/tables.js";
+import { isOf, planned } from "../drawer/tables.js";
 import { AXES, deg, isAngle, mm, num, pct } from "../format.js";
 import { tag, toneOf, verdict } from "../status.js";
 
@@ -26,7 +26,7 @@ export function content(shell) {
       button(picking ? "Picking: on" : "Picking: off", () => shell.view.send({ pick: picking ? "none" : "keypoints" }), { class: picking ? "on" : "", "aria-pressed": String(picking), key: "picking" }),
       button("Undo", () => step(shell, "undo"), { disabled: !view?.undo, title: "Ctrl+Z" }), button("Redo", () => step(shell, "redo"), { disabled: !view?.redo, title: "Ctrl+Shift+Z" }),
       button("Clear", () => shell.do(() => shell.view.send({ clear: true })), { disabled: !n })),
-    fresh?.issues?.some((i) => !keypoints.some((k) => k.id === i.where)) && h("div", { class: "stack" }, fresh.issues.filter((i) => !keypoints.some((k) => k.id === i.where)).map((i) => h("p", { class: "small soft" }, i.message))),
+    fresh?.issues?.some((i) => !keypoints.some((k) => isOf(i, k.id))) && h("div", { class: "stack" }, fresh.issues.filter((i) => !keypoints.some((k) => isOf(i, k.id))).map((i) => h("p", { class: "small soft" }, i.message))),
   ];
 }
 

@@ -19,7 +19,7 @@ function overview(part) {
   return [
     h("div", { class: "stack" }, h("h3", {}, "Size"), h("div", { class: "big" }, `${size(x)} × ${size(y)} × ${size(z)}`, h("span", { class: "unit" }, "mm"))),
     part.size_if && h("div", { class: "stack" }, h("p", { class: "soft small" }, `The file was read in ${part.unit}. If that is not its real size:`),
-      h("dl", { class: "facts" }, Object.entries(part.size_if).map(([unit, s]) => [h("dt", {}, `if it were ${unit}`), h("dd", {}, num(s.map(size).join(" × "), "mm"))]))),
+      h("dl", { class: "facts" }, Object.entries(part.size_if).filter(([unit]) => unit !== part.unit).map(([unit, s]) => [h("dt", {}, `in ${unit}`), h("dd", {}, num(s.map(size).join(" × "), "mm"))]))),
     facts([
       ["File", h("span", {}, part.name)], ["Triangles", whole(part.triangles)], ["Chord error", part.chord_error_mm === null ? null : part.chord_error_mm.toFixed(4), "mm"],
       ["On disk", bytes(part.bytes)], ["SHA-256", h("span", { class: "num", title: part.sha256 }, `${part.sha256.slice(0, 12)}…`)],
