@@ -15,12 +15,11 @@ _WRAPPED = 0.25
 
 @dataclass(frozen=True, eq=False)
 class ScanAxes:
-    """Right-handed axes of a raster in `part`: along the passes, across them, mean outward normal. wrapped: see below."""
+    """Right-handed axes of a raster in `part`: along the passes, across them, mean outward normal."""
 
     along: Array
     across: Array
     normal: Array
-    wrapped: bool
 
 
 def scan_axes(surface: InspectionSurface, direction_deg: float) -> ScanAxes:
@@ -28,27 +27,27 @@ def scan_axes(surface: InspectionSurface, direction_deg: float) -> ScanAxes:
 
     The longest extent is the long side of the smallest rectangle around the surface seen along its mean normal, so
     that neither the number nor the place of the triangles matters; a square keeps the part axis nearest to X. A surface
-    that closes on itself (`wrapped`: a tube, a full skin) has no mean normal: its long axis is the principal axis of
-    its area, and the normal is the one square to it with the largest extent.
+    that closes on itself (a tube, a full skin) has no mean normal: its passes run round the principal axis of its area,
+    with the array along it, where such surfaces are straight and passes in one plane do not graze; `direction_deg` 90
+    turns them along the axis.
     """
     a = surface.face_areas_mm2
     total = float(a.sum())
     if not total > 0.0:
         raise fail("surface-empty", "The inspection surface has no area.", "Choose another surface.")
     mean = a @ surface.face_normals / total
-    wrapped = bool(np.linalg.norm(mean) < _WRAPPED)
-    if wrapped:
-        tensor = _area_tensor(surface)
-        _, vectors = np.linalg.eigh(tensor)
-        longest, normal = vectors[:, 2], vectors[:, 1]
+    if float(np.linalg.norm(mean)) < _WRAPPED:
+        _, vectors = np.linalg.eigh(_area_tensor(surface))
+        normal = _canonical(vectors[:, 1])
+        longest = np.cross(_canonical(vectors[:, 2]), normal)
     else:
         normal = mean / np.linalg.norm(mean)
         longest = _long_side(surface.vertices, normal)
-    longest = _canonical(longest)
+        longest = _canonical(longest)
     turn = np.radians(direction_deg)
     along = np.cos(turn) * longest + np.sin(turn) * np.cross(normal, longest)
     along /= np.linalg.norm(along)
-    return ScanAxes(along, np.cross(normal, along), normal, wrapped)
+    return ScanAxes(along, np.cross(normal, along), normal)
 
 
 def _canonical(v: Array) -> Array:

@@ -68,13 +68,13 @@ class PathMesh:
             return np.full(len(points), np.inf)
         a, b = self.vertices[pairs[:, 0]], self.vertices[pairs[:, 1]]
         length = np.linalg.norm(b - a, axis=1)
-        spacing = max(within_mm / 4.0, float(length.sum()) / 2e5, 1e-6)
+        spacing = max(within_mm / 8.0, float(length.sum()) / 2e5, 1e-6)
         pieces = np.maximum(np.ceil(length / spacing), 1.0).astype(np.int64)
         edge = np.repeat(np.arange(len(pairs)), pieces)
         rank = np.arange(len(edge)) - np.repeat(np.cumsum(pieces) - pieces, pieces)
         at = a[edge] + (b - a)[edge] * ((rank + 0.5) / pieces[edge])[:, None]
         reach = float(np.hypot(within_mm, spacing))
-        _, near = cKDTree(at, balanced_tree=False).query(points, k=2, distance_upper_bound=reach, workers=2)
+        _, near = cKDTree(at, balanced_tree=False).query(points, k=3, distance_upper_bound=reach, workers=2)
         near = near.reshape(len(points), -1)
         out = np.full(len(points), np.inf)
         for column in near.T:

@@ -21,10 +21,9 @@ def plane_cut(curved: CurvedSurface, mesh: PathMesh, axes: ScanAxes, setup: Setu
     """Return sections by planes along the passes.
 
     The distance between two planes is the step on the surface times the cosine of the slope across them, so that
-    the pitch measured on the surface is never larger than asked. On a surface that closes on itself the planes stand
-    square to the long axis (rings): sections along it would graze the sides.
+    the pitch measured on the surface is never larger than asked.
     """
-    across = axes.along if axes.wrapped else axes.across
+    across = axes.across
     v = mesh.vertices @ across
     used = v[mesh.faces]
     v_range = (float(used.min()), float(used.max()))

@@ -9,6 +9,8 @@ from planner.frames import Array
 from planner.path.isolines import Chains, Ints
 from planner.path.mesh import PathMesh
 
+_SECANTS = 3
+
 
 @dataclass(frozen=True, eq=False)
 class Tracks:
@@ -140,8 +142,32 @@ def _within_margin(
     ahead = _fraction(distance[high], distance[after], margin)
     s0 = (low - first[chain] - back * (low - before)) * step[low]
     s1 = (high - first[chain] + ahead * (after - high)) * step[high]
+    rate = _rate(distance[low], distance[before], step[low]), _rate(distance[high], distance[after], step[high])
+    for _ in range(_SECANTS):
+        # Beside curved or cornered edges the distance is not linear between two samples.
+        off = [margin - mesh.boundary_distance(_points_at(lengths, chain, s), margin * 1.5) for s in (s0, s1)]
+        s0 = np.clip(s0 + np.where(np.isfinite(off[0]), off[0], 0.0) * rate[0], 0.0, s1)
+        s1 = np.clip(s1 - np.where(np.isfinite(off[1]), off[1], 0.0) * rate[1], s0, lengths.total[chain])
     loop = whole[chain]
     return chain, np.where(loop, 0.0, s0), np.where(loop, lengths.total[chain], s1), loop
+
+
+def _rate(inside: Array, outside: Array, step: Array) -> Array:
+    """Return how far to go along the chain (k,) per mm of distance from the boundary; 0 where it ends at the margin."""
+    gap = inside - outside
+    return np.where(gap > 1e-6, np.minimum(step / np.maximum(gap, 1e-6), 20.0), 0.0)
+
+
+def _points_at(lengths: Lengths, chain: Ints, s: Array) -> Array:
+    at = lengths.start[chain] + s
+    numbers = np.arange(len(lengths.chains.level))
+    head = np.searchsorted(lengths.chains.chain, numbers)
+    tail = np.searchsorted(lengths.chains.chain, numbers, side="right") - 1
+    seg = np.clip(np.searchsorted(lengths.end, at, side="left"), head[chain], tail[chain])
+    d = lengths.b[seg] - lengths.a[seg]
+    length = np.linalg.norm(d, axis=1)
+    back = np.divide(lengths.end[seg] - at, length, out=np.zeros_like(at), where=length > 0)
+    return lengths.b[seg] - np.clip(back, 0.0, 1.0)[:, None] * d
 
 
 def _fraction(inside: Array, outside: Array, margin: float) -> Array:
