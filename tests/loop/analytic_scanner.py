@@ -102,6 +102,10 @@ def correlated(rng, m, passes, spacing, length, width):
     return x
 
 
+def axis(name):
+    return (-1.0 if name[0] == "-" else 1.0) * np.eye(3)["xyz".index(name[-1])]
+
+
 def scan(
     folder,
     surface,
@@ -133,7 +137,11 @@ def scan(
     actual = T.copy()
     actual[:, :3, 3] += pose_mm * noise[:, :3]
     actual[:, :3, :3] = Rotation.from_rotvec(np.radians(pose_deg) * noise[:, 3:]).as_matrix() @ T[:, :3, :3]
+    # The tool as taught may name its axes otherwise: beam and array are looked up in it.
+    tool = setup.get("tool", {})
+    beam, array = (axis(tool.get(name, usual)) for name, usual in (("beam_axis", "z"), ("array_axis", "x")))
     P = np.linalg.inv(T_base_part) @ actual
+    P[:, :3, :3] = P[:, :3, :3] @ np.stack([array, np.cross(beam, array), beam], axis=1)
     xa, ya, za = P[:, :3, 0], P[:, :3, 1], P[:, :3, 2]
     origin = (P[:, None, :3, 3] + x[None, :, None] * xa[:, None] - probe["face_offset_mm"] * za[:, None]).reshape(-1, 3)
     xa, ya, za = (np.repeat(a, laws, axis=0) for a in (xa, ya, za))
