@@ -13,6 +13,7 @@ from app.steps.programs import export_path, program_name
 from planner.cad import read_part
 from planner.checks import check
 from planner.errors import EchoBaseError
+from planner.frames import Array
 from planner.issues import Issue, errors_in
 from planner.keypoint import KeyPoint
 from planner.part import Part
@@ -24,6 +25,7 @@ from planner.path.raster import raster
 from planner.setup import Setup
 from planner.surface.curved import CurvedSurface, footprint_mm
 from planner.surface.facing import facing_issues
+from planner.surface.inspection import InspectionSurface
 from planner.surface.select import inspection_surface
 from planner.toolpath import ToolPath
 
@@ -53,9 +55,8 @@ def run_plan(request: PlanRequest, progress: Progress) -> tuple[Plan, Artifacts]
         assert request.source is not None
         part = read_part(request.source, request.name, request.unit)
     progress(0.25, "finding the inspection surface")
-    seeds = [*request.seeds_part, *(k.xyz() for k in request.keypoints)]
     up_part = setup.T_base_partnom.inv().directions([0.0, 0.0, 1.0])
-    surface = inspection_surface(part, seeds or None, up_part)
+    surface = _surface(part, request, up_part)
     curved = CurvedSurface(surface, footprint_mm(setup.probe))
     progress(0.35, "choosing key points")
     keypoints = snap(curved, request.keypoints) if request.keypoints else suggest(curved, setup)
@@ -90,6 +91,18 @@ def run_plan(request: PlanRequest, progress: Progress) -> tuple[Plan, Artifacts]
     plan = replace(plan, issues=tuple(issues))
     progress(1.0, "planned")
     return plan, plan_artifacts(plan) | programs
+
+
+def _surface(part: Part, request: PlanRequest, up_part: Array) -> InspectionSurface:
+    """Return the surface flooded from seeds and key points; an error about a key point names it by its id."""
+    places = {f"seed {i}": f"seed {i}" for i in range(1, len(request.seeds_part) + 1)}
+    for i, keypoint in enumerate(request.keypoints, len(request.seeds_part) + 1):
+        places[f"seed {i}"] = f"key point {keypoint.id}"
+    try:
+        seeds = [*request.seeds_part, *(k.xyz() for k in request.keypoints)]
+        return inspection_surface(part, seeds or None, up_part)
+    except EchoBaseError as error:
+        raise EchoBaseError(*(replace(i, where=places.get(i.where, i.where)) for i in error.issues)) from error
 
 
 def _checked_program(plan: Plan, path: ToolPath) -> tuple[list[Issue], Artifacts, dict[str, Any]]:
