@@ -1,5 +1,7 @@
 """The engineer's way through the page, click by click; used by the test and by the picture."""
 
+import re
+
 from playwright.sync_api import Page
 
 SLOW = 180_000
@@ -27,10 +29,15 @@ def seen(page: Page) -> None:
     )
 
 
+def chosen(page: Page) -> None:
+    """Wait until the page speaks of a number of key points."""
+    page.locator(".inspector .verdict", has_text=re.compile(r"\d+ key points")).wait_for(timeout=SLOW)
+
+
 def suggest(page: Page) -> None:
     step(page, "Key points")
     page.get_by_role("button", name="Suggest key points").click()
-    page.locator(".inspector .verdict", has_text="key points").wait_for(timeout=SLOW)
+    chosen(page)
 
 
 def plan(page: Page) -> None:
