@@ -1,0 +1,7 @@
+"""Parts that sprang back: the smooth field by which a part stands out of its CAD, with its support and uncertainty."""
+
+from alignment.non_rigid.field import Field
+from alignment.non_rigid.fit import FieldFit, fit_field
+from alignment.non_rigid.shape import SprungSurface
+
+__all__ = ["Field", "FieldFit", "SprungSurface", "fit_field"]

@@ -1,0 +1,118 @@
+"""What the residuals of a scan say about the part's shape: some hundred nodes, each the mean of many readings."""
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.spatial import cKDTree
+
+from alignment.estimate.noise_rows import NoiseRows, coarse_of
+from alignment.estimate.patches import Patches
+from alignment.estimate.robust import mad_sigma
+from alignment.estimate.surface_rows import Rows
+from planner.frames import Array, Transform
+from planner.setup import Setup
+
+NEIGHBOURS = 16
+# A patch this far (mm, and robust standard deviations) from its neighbours' middle is no shape of a part.
+LONE_MM, LONE_SIGMAS = 1.0, 8.0
+
+
+@dataclass(frozen=True, eq=False)
+class Nodes:
+    """n nodes. deviation_mm (n,): how far the part stands out of its CAD along the normal, mean over the node.
+
+    points_part (n, 3): mean foot, `part`, mm. height_mm (n,): distance from which it was measured. rows: the same nodes
+    as the noise model knows them, whose design x (n, 6) is the normal displacement of motions about the centroid, in
+    prior standard deviations, axes of base. scatter_mm: of a single reading.
+    """
+
+    deviation_mm: Array
+    points_part: Array
+    height_mm: Array
+    rows: NoiseRows
+    scatter_mm: float
+
+    def __len__(self) -> int:
+        return len(self.deviation_mm)
+
+    @property
+    def passes(self) -> int:
+        """Number of passes, 0 without a path."""
+        return len(np.unique(self.rows.block_pass)) if self.rows.has_path else 0
+
+    def only(self, keep: NDArray[np.bool_]) -> "Nodes":
+        """Return the selected nodes."""
+        r = self.rows
+        rows = NoiseRows(
+            r.r[keep], r.x[keep], r.count[keep], r.block[keep], r.across[keep], r.position_base[keep], r.size_mm,
+            r.block_from_mm, r.block_to_mm, r.block_pass, r.edge[keep],
+        )  # fmt: skip
+        return Nodes(self.deviation_mm[keep], self.points_part[keep], self.height_mm[keep], rows, self.scatter_mm)
+
+
+def believable(patches: Patches, rows: Rows, setup: Setup) -> NDArray[np.bool_]:
+    """Return which patches (p,) may tell of the part's shape: on the surface, and not on their own.
+
+    A bend or a dent is no outlier: patches are compared with their neighbours, not with the rigid part.
+    """
+    keep = rows.valid & (np.abs(rows.r) < setup.alignment.search_radius_mm)
+    for _ in range(2):
+        at = np.flatnonzero(keep)
+        if len(at) <= NEIGHBOURS:
+            break
+        near = cKDTree(rows.foot_base[at]).query(rows.foot_base[at], NEIGHBOURS)[1]
+        off = rows.r[at] - np.median(rows.r[at][near], axis=1)
+        keep[at] = np.abs(off) < LONE_MM + LONE_SIGMAS * mad_sigma(off, 1e-3, about_zero=True)
+    return keep
+
+
+def gather(
+    patches: Patches, rows: Rows, keep: NDArray[np.bool_], T_base_part: Transform, setup: Setup, most: int
+) -> Nodes:
+    """Return at most about `most` nodes of the patches `keep` (p,)."""
+    picked = np.flatnonzero(keep)
+    weight = patches.count[picked]
+    cells = patches.cells
+    with_path = not np.isnan(cells.s_from_mm).all()
+    if with_path:
+        row, info = coarse_of(patches, keep, most)
+        at, n = row[picked], len(info)
+        _, first, block = np.unique(info[:, 3], return_index=True, return_inverse=True)
+        s_from, s_to = np.full(len(first), np.inf), np.full(len(first), -np.inf)
+        np.minimum.at(s_from, block, info[:, 0])
+        np.maximum.at(s_to, block, info[:, 1])
+        pass_id = info[first, 2].astype(np.int32)
+    else:
+        at, n = _in_space(rows.foot_base[picked], most)
+        block, s_from, pass_id = np.full(n, -1), np.zeros(0), np.zeros(0, dtype=np.int32)
+        s_to = s_from.copy()
+    total = np.bincount(at, weight, n)
+
+    def mean(values: Array) -> Array:
+        columns = values.reshape(len(picked), -1)
+        return np.stack([np.bincount(at, weight * c, n) / total for c in columns.T], axis=1)
+
+    fixture = setup.fixture
+    prior = np.repeat([np.radians(fixture.sigma_deg), fixture.sigma_mm], 3)
+    r = mean(rows.r[picked])[:, 0]
+    position = mean(rows.foot_base[picked])
+    across = mean(cells.across_mm[picked])[:, 0] / max(0.5 * setup.probe.swath_mm, 1e-9)
+    gap = cKDTree(position).query(position, 2)[0][:, 1] if n > 1 else np.ones(1)
+    noise = NoiseRows(
+        r, mean(rows.jacobian[picked] * prior), total, block.astype(np.int32), across, position, float(np.median(gap)),
+        s_from, s_to, pass_id, np.zeros(n, dtype=bool),
+    )  # fmt: skip
+    height = mean(patches.distance_mm[picked])[:, 0]
+    return Nodes(-r, T_base_part.inv().points(position), height, noise, patches.sigma_mm)
+
+
+def _in_space(points: Array, most: int) -> tuple[NDArray[np.intp], int]:
+    size = max(float(np.ptp(points, axis=0).max()) / 400.0, 1e-6)
+    while True:
+        cell = np.floor((points - points.min(axis=0)) / size).astype(np.int64)
+        _, at = np.unique(cell, axis=0, return_inverse=True)
+        n = 1 + int(at.max(initial=0))
+        if n <= most:
+            return at.ravel(), n
+        size *= 1.2
