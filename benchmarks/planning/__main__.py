@@ -35,8 +35,8 @@ def main() -> None:
     print(UNITS)
     every = panels()
     for panel in every:
-        for strategy in ("plane", "geodesic"):
-            print(line(run(panel, strategy)), flush=True)
+        for row in run(panel):
+            print(line(row), flush=True)
     theirs, ours = trimesh_seconds(every[1], 2.0)
     print(f"slicing alone, {every[1].name}: trimesh {theirs:.2f} s, EchoBase {ours:.2f} s, {theirs / ours:.1f}x")
     print(f"{time.perf_counter() - begin:.0f} s in all")

@@ -1,6 +1,7 @@
 """What is measured on each panel."""
 
 import time
+from collections.abc import Iterator
 from dataclasses import dataclass
 
 import numpy as np
@@ -48,12 +49,18 @@ def setup_for(panel: Panel, strategy: str, step_mm: float) -> Setup:
     )
 
 
-def run(panel: Panel, strategy: str, step_mm: float = 2.0) -> Row:
-    """Plan one panel and compare with the analytic surface."""
-    setup = setup_for(panel, strategy, step_mm)
+def run(panel: Panel, step_mm: float = 2.0) -> Iterator[Row]:
+    """Plan one panel by both strategies and compare with the analytic surface; the curved surface is built once."""
+    setup = setup_for(panel, "plane", step_mm)
     surface = panel.surface()
     t0 = time.perf_counter()
     curved = CurvedSurface(surface, footprint_mm(setup.probe))
+    seconds = time.perf_counter() - t0
+    for strategy in ("plane", "geodesic"):
+        yield _row(panel, curved, seconds, setup_for(panel, strategy, step_mm))
+
+
+def _row(panel: Panel, curved: CurvedSurface, surface_s: float, setup: Setup) -> Row:
     t1 = time.perf_counter()
     path = raster(curved, setup)
     t2 = time.perf_counter()
@@ -65,7 +72,7 @@ def run(panel: Panel, strategy: str, step_mm: float = 2.0) -> Row:
     missed_inside = covered.missed_mm2 - covered.margin_mm2
     return Row(
         panel.name,
-        strategy,
+        setup.inspection.strategy,
         len(panel.faces),
         path.passes,
         int(path.is_data.sum()),
@@ -73,7 +80,7 @@ def run(panel: Panel, strategy: str, step_mm: float = 2.0) -> Row:
         low,
         high,
         missed_inside,
-        t1 - t0,
+        surface_s,
         t2 - t1,
         t3 - t2,
         len(sparse),

@@ -23,7 +23,8 @@ from planner.surface.curved import CurvedSurface
 from planner.toolpath import ToolPath
 
 _RIM_SPACING_MM = 5.0
-_CROSSING_MM = 20.0
+# How far inside a crossing of its own begins: long enough to settle, short enough not to fill a small part.
+_CROSSING_SHARE, _CROSSING_MM = 0.08, (8.0, 20.0)
 
 
 def alignment_path(curved: CurvedSurface, keypoints: tuple[KeyPoint, ...], setup: Setup) -> ToolPath:
@@ -62,7 +63,7 @@ def passes_through(curved: CurvedSurface, keypoints: tuple[KeyPoint, ...], setup
 def _lines(curved: CurvedSurface, mesh: PathMesh, points: Array, normals: Array, axes: ScanAxes) -> list[Stroke]:
     """Return the strokes through points in order: one plane if they share it, else leg by leg."""
     if len(points) == 1:
-        foot = curved.closest(points[0] + np.outer([1.0, -1.0], axes.along) * _CROSSING_MM)
+        foot = curved.closest(points[0] + np.outer([1.0, -1.0], axes.along) * _CROSSING_MM[1])
         k = int(np.argmax(np.linalg.norm(foot.points - points[0], axis=1)))
         other = np.einsum("k,kj->j", foot.bary[k], mesh.vertices[mesh.faces[foot.face[k]]])
         return section(mesh, np.stack([points[0], other]), np.stack([normals[0], foot.normals[k]]))
@@ -103,7 +104,9 @@ def _crossings(
 def _crossing(curved: CurvedSurface, mesh: PathMesh, edges: Rim, k: int, setup: Setup) -> Run | None:
     """Return the pass from inside across the edge at point k of the rim, or None where no straight way leads there."""
     p, c = edges.points[k], edges.conormals[k]
-    foot = curved.closest(np.stack([p - c * _CROSSING_MM, p - c * 0.01]))
+    size = float(np.sqrt(curved.surface.area_mm2))
+    inside = min(float(np.clip(_CROSSING_SHARE * size, *_CROSSING_MM)), size / 4.0)
+    foot = curved.closest(np.stack([p - c * inside, p - c * 0.01]))
     on_mesh = np.einsum("nk,nkj->nj", foot.bary, mesh.vertices[mesh.faces[foot.face]])
     try:
         stroke = section(mesh, on_mesh, foot.normals)[-1]

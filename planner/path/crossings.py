@@ -13,7 +13,7 @@ from planner.surface.boundary import EdgeKind, boundary
 from planner.surface.inspection import InspectionSurface
 
 # What one reading of an edge, and one patch of surface, is worth (mm, one sigma); only their ratio to the fixture counts.
-EDGE_SIGMA_MM = 0.1
+EDGE_SIGMA_MM = 0.05
 PATCH_SIGMA_MM = 0.05
 PATCH_MM = 10.0
 _SETTLED = 0.15

@@ -9,6 +9,7 @@ from scipy.sparse.linalg import splu
 from planner.errors import fail
 from planner.frames import Array
 from planner.part import Faces
+from planner.path.isolines import Ints
 
 _GOOD_GRADIENT = 0.01
 _ROUNDS = 2
@@ -32,19 +33,30 @@ def guide_distance(vertices: Array, faces: Faces, height: Array) -> Array:
     near = np.full(len(vertices), np.inf)
     np.minimum.at(near, faces[crossed].ravel(), (np.abs(h[crossed]) / slope[crossed, None]).ravel())
     source = np.flatnonzero(np.isfinite(near))
-    solver = potpourri3d.MeshFastMarchingDistanceSolver(vertices, faces)
-    d = np.asarray(solver.compute_distance([[(int(k), [])] for k in source], [[float(x)] for x in near[source]], False))
-    d = np.where(height < 0.0, -d, d)
-    if not np.isfinite(d).all():
-        raise fail(
-            "field-broken", "The distance over the surface is not finite.", "Repair the mesh, or use strategy 'plane'."
-        )
     sound = area > 1e-12 * float(area.max())
+    d = _marched(vertices, faces[sound], source, near[source])
+    # What no way over the surface leads to keeps its plain height, as a plane section would have it.
+    d = np.where(np.isfinite(d), d, np.abs(height))
+    d = np.where(height < 0.0, -d, d)
     length = np.linalg.norm(np.einsum("tik,ti->tk", gradient, d[faces]), axis=1)
     uneven = float(area[sound & (np.abs(length - 1.0) > _GOOD_GRADIENT)].sum() / area.sum())
     if uneven < _GOOD_GRADIENT:
         return d
     return _polished(vertices, faces, d, np.isfinite(near), sound)
+
+
+def _marched(vertices: Array, faces: Faces, source: Ints, start: Array) -> Array:
+    """Return fast-marching distances (v,) from vertices with given distances; inf where they do not lead."""
+    used, compact = np.unique(faces, return_inverse=True)
+    number = np.full(len(vertices), -1, dtype=np.int64)
+    number[used] = np.arange(len(used))
+    here = number[source] >= 0
+    solver = potpourri3d.MeshFastMarchingDistanceSolver(vertices[used], compact.reshape(-1, 3))
+    curves: list[list[tuple[int, list[float]]]] = [[(int(k), [])] for k in number[source][here]]
+    marched = np.asarray(solver.compute_distance(curves, [[float(x)] for x in start[here]], False))
+    d = np.full(len(vertices), np.inf)
+    d[used] = np.where(np.isfinite(marched) & (marched < 1e30), marched, np.inf)
+    return d
 
 
 def _gradients(vertices: Array, faces: Faces) -> tuple[Array, Array]:

@@ -64,8 +64,26 @@ class PathMesh:
     def boundary_distance(self, points: Array, within_mm: float) -> Array:
         """Return the distance (n,) of points to the boundary, exact up to `within_mm`, inf beyond it."""
         pairs = self.boundary_edges
-        if len(pairs) == 0:
+        if len(pairs) == 0 or len(points) == 0:
             return np.full(len(points), np.inf)
+        tree, edge, spacing = self._boundary_tree(within_mm)
+        reach = float(np.hypot(within_mm, spacing))
+        _, near = tree.query(points, k=3, distance_upper_bound=reach, workers=2 if len(points) > 2000 else 1)
+        near = near.reshape(len(points), -1)
+        a, b = self.vertices[pairs[:, 0]], self.vertices[pairs[:, 1]]
+        out = np.full(len(points), np.inf)
+        for column in near.T:
+            hit = np.flatnonzero(column < len(edge))
+            e = edge[column[hit]]
+            out[hit] = np.minimum(out[hit], _to_segment(points[hit], a[e], b[e]))
+        return np.where(out <= within_mm, out, np.inf)
+
+    def _boundary_tree(self, within_mm: float) -> tuple[cKDTree, Ints, float]:
+        """Return a tree over the middles of short pieces of the boundary, their edges, and the length of a piece."""
+        known = self._trees.get(within_mm)
+        if known is not None:
+            return known
+        pairs = self.boundary_edges
         a, b = self.vertices[pairs[:, 0]], self.vertices[pairs[:, 1]]
         length = np.linalg.norm(b - a, axis=1)
         spacing = max(within_mm / 8.0, float(length.sum()) / 2e5, 1e-6)
@@ -73,15 +91,12 @@ class PathMesh:
         edge = np.repeat(np.arange(len(pairs)), pieces)
         rank = np.arange(len(edge)) - np.repeat(np.cumsum(pieces) - pieces, pieces)
         at = a[edge] + (b - a)[edge] * ((rank + 0.5) / pieces[edge])[:, None]
-        reach = float(np.hypot(within_mm, spacing))
-        _, near = cKDTree(at, balanced_tree=False).query(points, k=3, distance_upper_bound=reach, workers=2)
-        near = near.reshape(len(points), -1)
-        out = np.full(len(points), np.inf)
-        for column in near.T:
-            hit = np.flatnonzero(column < len(at))
-            e = edge[column[hit]]
-            out[hit] = np.minimum(out[hit], _to_segment(points[hit], a[e], b[e]))
-        return np.where(out <= within_mm, out, np.inf)
+        made = self._trees[within_mm] = (cKDTree(at, balanced_tree=False), edge, spacing)
+        return made
+
+    @cached_property
+    def _trees(self) -> dict[float, tuple[cKDTree, Ints, float]]:
+        return {}
 
 
 _KNOWN: WeakKeyDictionary[InspectionSurface, PathMesh] = WeakKeyDictionary()

@@ -11,8 +11,9 @@ from planner.path.axes import ScanAxes
 from planner.path.cut import Cut, surface_samples, tangent
 from planner.path.field import guide_distance
 from planner.path.holes import fill_holes
-from planner.path.isolines import isolines
+from planner.path.isolines import isolines, neighbours
 from planner.path.layout import levels, step_field
+from planner.path.manifold import unglued
 from planner.path.mesh import PathMesh
 from planner.path.subdivide import Subdivision, split_long_edges
 from planner.path.swath import effective_half_mm, step_mm
@@ -71,7 +72,7 @@ def _guided(mesh: PathMesh, axes: ScanAxes) -> _Guided:
     if known is not None and (known.axes.along == axes.along).all() and (known.axes.across == axes.across).all():
         return known
     size = float(np.linalg.norm(np.ptp(mesh.vertices[mesh.faces].reshape(-1, 3), axis=0)))
-    closed = fill_holes(mesh)
+    closed = fill_holes(unglued(mesh))
     whole = split_long_edges(closed.vertices, closed.faces, size * _FINENESS)
     height = whole.vertices @ axes.across
     d = guide_distance(whole.vertices, whole.faces, height - _guide_offset(whole, height))
@@ -81,14 +82,15 @@ def _guided(mesh: PathMesh, axes: ScanAxes) -> _Guided:
 
 
 def _guide_offset(whole: Subdivision, height: Array) -> float:
-    """Return the height of the longest section, central ones preferred: its whole length guides the raster."""
+    """Return the height of the longest unbroken section, central ones preferred."""
     used = height[whole.faces]
     lo, hi = float(used.min()), float(used.max())
     share = np.linspace(0.1, 0.9, _GUIDES)
-    chains = isolines(height, whole.faces, np.full(whole.faces.shape, -1, dtype=np.int64), lo + share * (hi - lo))
+    chains = isolines(height, whole.faces, neighbours(whole.faces), lo + share * (hi - lo))
     corner = whole.vertices[whole.faces[chains.face]]
     step = np.einsum("mk,mkj->mj", chains.bary_out - chains.bary_in, corner)
-    length = np.bincount(chains.level[chains.chain], np.linalg.norm(step, axis=1), minlength=_GUIDES)
+    length = np.zeros(_GUIDES)
+    np.maximum.at(length, chains.level, np.bincount(chains.chain, np.linalg.norm(step, axis=1)))
     best = int(np.argmax(np.round(length / length.max(), 6) - 0.2 * np.abs(share - 0.5)))
     return lo + float(share[best]) * (hi - lo)
 

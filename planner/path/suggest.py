@@ -23,6 +23,7 @@ _SHARES = (0.35, 0.5, 0.65)
 _CLOSE_ENOUGH = 0.01
 _ROUNDS = 8
 _POINTS_WANTED = 12
+_APART_MM = 8.0
 # Different for the two families, or the points of crossing strips would meet near the corners.
 _ALONG_INSET, _ACROSS_INSET = 1.2, 1.8
 
@@ -108,7 +109,7 @@ def _family(mesh: PathMesh, side: Array, length: float, setup: Setup, shift: flo
     # Round a loop a strip goes less than half way, so that its two ends say which way.
     usable = [0.45 * s.length if s.loop else s.length for s in probe]
     typical = float(np.median(usable))
-    least = min(2.5 * setup.alignment.search_radius_mm, 0.45 * typical)
+    least = min(2.0 * setup.alignment.search_radius_mm, 0.45 * typical)
     count = int(np.ceil(length / typical - 0.05))
     if count < 2:
         count = 2 if length / 2.0 >= least else 1
@@ -168,7 +169,7 @@ def _places(curved: CurvedSurface, mesh: PathMesh, strip: _Strip, count: int, se
     """Return where on the strip its key points stand: off the edges by their search radius, off curved places."""
     radius = setup.alignment.search_radius_mm
     span = strip.s1 - strip.s0
-    off = min(strip.inset * radius, 0.45 * span, 0.9 * EDGE_REACH_MM)
+    off = min(strip.inset * radius, max(0.45 * span, span - _APART_MM), 0.9 * EDGE_REACH_MM)
     a = strip.s0 + (off if strip.free[0] else 0.0)
     b = strip.s1 - (off if strip.free[1] else 0.0)
     count = int(np.clip(1 + (b - a) // (2.0 * radius), 2, count))

@@ -9,7 +9,7 @@ from planner.frames import Array
 from planner.path.isolines import Chains, Ints
 from planner.path.mesh import PathMesh
 
-_SECANTS = 3
+_HALVINGS = 20
 
 
 @dataclass(frozen=True, eq=False)
@@ -138,24 +138,23 @@ def _within_margin(
     low, high = low[has], high[has]
     chain = probe.run[low]
     before, after = np.maximum(low - 1, first[chain]), np.minimum(high + 1, last[chain])
-    back = _fraction(distance[low], distance[before], margin)
-    ahead = _fraction(distance[high], distance[after], margin)
-    s0 = (low - first[chain] - back * (low - before)) * step[low]
-    s1 = (high - first[chain] + ahead * (after - high)) * step[high]
-    rate = _rate(distance[low], distance[before], step[low]), _rate(distance[high], distance[after], step[high])
-    for _ in range(_SECANTS):
-        # Beside curved or cornered edges the distance is not linear between two samples.
-        off = [margin - mesh.boundary_distance(_points_at(lengths, chain, s), margin * 1.5) for s in (s0, s1)]
-        s0 = np.clip(s0 + np.where(np.isfinite(off[0]), off[0], 0.0) * rate[0], 0.0, s1)
-        s1 = np.clip(s1 - np.where(np.isfinite(off[1]), off[1], 0.0) * rate[1], s0, lengths.total[chain])
+    spans = step[low]
+    s0 = _margin_between(mesh, lengths, chain, (before - first[chain]) * spans, (low - first[chain]) * spans, margin)
+    s1 = _margin_between(mesh, lengths, chain, (after - first[chain]) * spans, (high - first[chain]) * spans, margin)
     loop = whole[chain]
     return chain, np.where(loop, 0.0, s0), np.where(loop, lengths.total[chain], s1), loop
 
 
-def _rate(inside: Array, outside: Array, step: Array) -> Array:
-    """Return how far to go along the chain (k,) per mm of distance from the boundary; 0 where it ends at the margin."""
-    gap = inside - outside
-    return np.where(gap > 1e-6, np.minimum(step / np.maximum(gap, 1e-6), 20.0), 0.0)
+def _margin_between(
+    mesh: PathMesh, lengths: Lengths, chain: Ints, outside: Array, inside: Array, margin: float
+) -> Array:
+    """Return where on the chains the margin is reached between two places (mm), by halving; `inside` keeps it."""
+    outside, inside = outside.copy(), inside.copy()
+    for _ in range(_HALVINGS):
+        middle = 0.5 * (outside + inside)
+        kept = mesh.boundary_distance(_points_at(lengths, chain, middle), margin * 1.5) >= margin
+        inside, outside = np.where(kept, middle, inside), np.where(kept, outside, middle)
+    return inside
 
 
 def _points_at(lengths: Lengths, chain: Ints, s: Array) -> Array:
@@ -168,12 +167,6 @@ def _points_at(lengths: Lengths, chain: Ints, s: Array) -> Array:
     length = np.linalg.norm(d, axis=1)
     back = np.divide(lengths.end[seg] - at, length, out=np.zeros_like(at), where=length > 0)
     return lengths.b[seg] - np.clip(back, 0.0, 1.0)[:, None] * d
-
-
-def _fraction(inside: Array, outside: Array, margin: float) -> Array:
-    """Return how far (0..1) from the inside sample towards the outside one the margin lies."""
-    gap = inside - outside
-    return np.clip(np.divide(inside - margin, gap, out=np.zeros_like(gap), where=gap > 0), 0.0, 1.0)
 
 
 def split_at_turns(track: Tracks, sharp: NDArray[np.bool_]) -> Tracks:

@@ -6,15 +6,18 @@ import pytest
 from benchmarks.planning.panels import cylinder, panels, tube
 from planner.errors import EchoBaseError
 from planner.keypoint import KeyPoint
+from planner.part import Part, Provenance
 from planner.path.alignment import alignment_path
 from planner.path.coverage import coverage
 from planner.path.keypoints import suggest
 from planner.path.tour import short_tour
 from planner.setup import Setup
+from planner.surface.curved import CurvedSurface
+from planner.surface.inspection import InspectionSurface
 from planner.toolpath import Role, ToolPath
 from tests.path.shapes import curved_of, plate
 
-SMALL = {p.name: p for p in panels(140, 50)}
+SMALL = {p.name: p for p in panels(90, 36)}
 NO_EDGES = Setup.model_validate({"alignment": {"edges": False}})
 
 
@@ -48,7 +51,7 @@ def test_hand_picked_points_are_all_passed(setup: Setup) -> None:
 
 
 def test_points_on_a_curved_panel_are_passed_and_followed() -> None:
-    panel = cylinder(140, 90)
+    panel = cylinder(100, 90)
     chosen = points(
         *[(x, 400 * np.sin(a), 400 * np.cos(a)) for x, a in ((-500, -0.3), (-100, 0.4), (300, -0.2), (600, 0.35))]
     )
@@ -103,10 +106,6 @@ def test_concave_edges_are_never_crossed() -> None:
     """A plate with a wall along x = 150: three sides are crossed, the wall is kept off by the margin."""
     v = np.array([[0, 0, 0], [150, 0, 0], [150, 100, 0], [0, 100, 0], [150, 0, 60], [150, 100, 60.0]])
     f = np.array([[0, 1, 2], [0, 2, 3], [1, 4, 5], [1, 5, 2]])
-    from planner.part import Part, Provenance
-    from planner.surface.curved import CurvedSurface
-    from planner.surface.inspection import InspectionSurface
-
     part = Part(v, f.astype(np.int32), Provenance("walled", "0" * 64, "mm"))
     curved = CurvedSurface(InspectionSurface(part, np.arange(2, dtype=np.int32)), 4.5)
     for keys in (points((40, 30, 0), (125, 30, 0), (125, 70, 0), (40, 70, 0)), suggest(curved, Setup())):

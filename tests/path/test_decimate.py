@@ -1,5 +1,6 @@
 """Decimation against scipy's CubicSpline, Slerp and a plain segment distance: written without the code under test."""
 
+from functools import cache
 from itertools import pairwise
 
 import numpy as np
@@ -61,9 +62,10 @@ CASES = {p.name: (p, s) for p, s in zip(panels(90, 30), ["plane", "geodesic"] * 
 LONG = [n for n in CASES if "short" not in n]
 
 
+@cache
 def dense_path(name: str) -> ToolPath:
     panel, strategy = CASES[name]
-    return raster(curved_of(panel), setup_of(strategy=strategy, step_mm=120.0))
+    return raster(curved_of(panel), setup_of(strategy=strategy, step_mm=160.0))
 
 
 @pytest.mark.parametrize("bc", ["not-a-knot", "natural"])

@@ -7,6 +7,7 @@ from scipy.spatial.transform import Rotation
 from benchmarks.planning.measure import normal_errors_deg, pitch
 from benchmarks.planning.panels import Panel, cylinder, panels, tube
 from planner.errors import EchoBaseError
+from planner.path.coverage import coverage
 from planner.path.raster import raster
 from planner.toolpath import Role, ToolPath
 from tests.path.shapes import crystal, curved_of, ell, flat, plate, rotated, setup_of
@@ -220,13 +221,13 @@ def test_an_absurd_step_is_refused() -> None:
 
 
 def test_sliver_triangles_do_not_bend_the_lines() -> None:
-    """A STEP-like strip: triangles 1000 mm long and 1 mm wide on R 400."""
-    a = np.linspace(-0.4, 0.4, 321)
+    """A STEP-like strip: triangles 1000 mm long and 1.6 mm wide on R 400."""
+    a = np.linspace(-0.4, 0.4, 201)
     v = np.concatenate([np.stack([np.full_like(a, x), 400 * np.sin(a), 400 * np.cos(a)], 1) for x in (0.0, 1000.0)])
-    i = np.arange(320)
-    f = np.concatenate([np.stack([i, i + 321, i + 322], 1), np.stack([i, i + 322, i + 1], 1)])
+    i = np.arange(200)
+    f = np.concatenate([np.stack([i, i + 201, i + 202], 1), np.stack([i, i + 202, i + 1], 1)])
     panel = Panel("slivers", v, f, lambda p: p)
-    path = data(raster(curved_of(panel), crystal(strategy="geodesic")))
+    path = data(raster(curved_of(panel), crystal(strategy="geodesic", point_spacing_mm=5.0)))
     arc = 400.0 * np.arctan2(points(path)[:, 1], points(path)[:, 2])
     middle = np.bincount(path.pass_id, arc) / np.bincount(path.pass_id)
     assert np.abs(arc - middle[path.pass_id]).max() < 0.05
@@ -235,3 +236,47 @@ def test_sliver_triangles_do_not_bend_the_lines() -> None:
 
 def test_flat_helper_faces_up() -> None:
     assert flat([(0, 0), (1, 0), (0, 1)], [(0, 1, 2)]).surface().mean_normal_part == pytest.approx([0, 0, 1])
+
+
+def test_sheets_that_touch_in_a_point_or_an_edge_are_planned() -> None:
+    """Two plates meeting in one corner, and a surface in two pieces: every piece gets its passes."""
+    v = [(0, 0), (100, 0), (100, 80), (0, 80), (-100, 0), (-100, -80), (0, -80)]
+    bow = flat(v, [(0, 1, 2), (0, 2, 3), (0, 4, 5), (0, 5, 6)])
+    one = SMALL["twist"]
+    apart = Panel(
+        "apart",
+        np.concatenate([one.vertices, one.vertices + np.array([0.0, 700.0, 0.0])]),
+        np.concatenate([one.faces, one.faces + len(one.vertices)]),
+        one.normals,
+    )
+    for panel, share in ((bow, 0.75), (apart, 0.95)):
+        curved, setup = curved_of(panel), setup_of(strategy="geodesic")
+        assert coverage(curved, raster(curved, setup), setup).within_share > share
+
+
+def test_degenerate_and_unmerged_triangles_change_nothing() -> None:
+    sound = SMALL["twist"]
+    loose = Panel(
+        "loose", sound.vertices[sound.faces].reshape(-1, 3), np.arange(sound.faces.size).reshape(-1, 3), sound.normals
+    )
+    broken = Panel("broken", sound.vertices, np.concatenate([sound.faces, [[3, 3, 4], [7, 8, 7]]]), sound.normals)
+    for strategy in STRATEGIES:
+        setup = setup_of(strategy=strategy)
+        expected = raster(curved_of(sound), setup)
+        for panel in (loose, broken):
+            path = raster(curved_of(panel), setup)
+            assert path.passes == expected.passes
+            assert len(path) == len(expected)
+
+
+def test_a_profile_bent_past_its_own_plane_is_covered() -> None:
+    """A channel bent over 270 deg: planes along it cut it twice; its lines still lie a step apart on the surface."""
+    a = np.linspace(-0.75 * np.pi, 0.75 * np.pi, 120)
+    x = np.linspace(0.0, 500.0, 40)
+    v = np.stack([np.repeat(x, 120), np.tile(80 * np.sin(a), 40), np.tile(80 * np.cos(a), 40)], axis=1)
+    i = np.arange(4800).reshape(40, 120)
+    p, q, r, s = i[:-1, :-1].ravel(), i[1:, :-1].ravel(), i[1:, 1:].ravel(), i[:-1, 1:].ravel()
+    panel = Panel("channel", v, np.concatenate([np.stack([p, q, r], 1), np.stack([p, r, s], 1)]), lambda n: n)
+    curved, setup = curved_of(panel), crystal(strategy="geodesic", step_mm=2.5)
+    c = coverage(curved, raster(curved, setup), setup)
+    assert c.missed_mm2 - c.margin_mm2 < 0.002 * c.area_mm2
