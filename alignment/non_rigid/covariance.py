@@ -1,8 +1,9 @@
 """Covariance of nodes: a smooth field on the part, a rigid rest, a wandering robot, and single readings.
 
-The field is a Gaussian process with the Matern kernel of smoothness 5/2 on distances in space (C. E. Rasmussen,
-C. K. I. Williams, Gaussian Processes for Machine Learning, 2006, eq. 4.17), twice differentiable, so that its slope is
-known with its own deviation. It has one length along the part and another across it. On a skin the distance in space is that along the surface for all that matters.
+The field is a Gaussian process with the Matern kernel of smoothness 5/2 (C. E. Rasmussen, C. K. I. Williams, Gaussian
+Processes for Machine Learning, 2006, eq. 4.17), differentiable, so that its slope is known with its own deviation. It has
+one length along the part and another across it: beams bend one way. On a skin the distance in space is that along the
+surface for all that matters.
 """
 
 from dataclasses import dataclass

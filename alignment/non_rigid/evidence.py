@@ -46,23 +46,22 @@ def weigh(nodes: Nodes, size_mm: float, swath_mm: float) -> Evidence:
     above = np.r_[prior.above[list(NOISE)], FIELD_SPREAD, LENGTH_SPREAD, LENGTH_SPREAD]
     spread = float(np.clip(np.std(nodes.deviation_mm), 1e-3, 1e2))
     noise = [0, 1, 2, 3, 4] if nodes.rows.has_path else [0]
-    limits = [(c - 6.0 * b, c + 6.0 * a) for c, b, a in zip(centre, below, above, strict=True)]
+    low, high = centre - 6.0 * below, centre + 6.0 * above
     shortest = min(2.0 * nodes.rows.size_mm, 0.3 * size_mm)
-    limits[ALONG:] = [(np.log(shortest), np.log(LONGEST * size_mm))] * 2
+    low[ALONG:], high[ALONG:] = np.log(shortest), np.log(LONGEST * size_mm)
 
     def climb(start: Array, active: list[int]) -> tuple[Array, float]:
         def cost(u: Array) -> tuple[float, Array]:
             theta = start.copy()
             theta[active] = u
             value, slope = _log_likelihood(covariance, theta, active)
-            width = np.where(theta < centre, below, above)[active]
+            width = np.asarray(np.where(theta < centre, below, above))[active]
             off = (u - centre[active]) / width
             return -value + 0.5 * float(off @ off), -slope + off / width
 
-        bounds = [limits[i] for i in active]
-        low, high = np.array(bounds).T
+        begin = np.clip(start, low, high)[active]
         best = minimize(
-            cost, np.clip(start[active], low, high), jac=True, method="L-BFGS-B", bounds=bounds,
+            cost, begin, jac=True, method="L-BFGS-B", bounds=list(zip(low[active], high[active], strict=True)),
             options={"maxiter": STEPS, "ftol": 1e-6},
         )  # fmt: skip
         theta = start.copy()

@@ -4,6 +4,7 @@ from dataclasses import dataclass, field
 from functools import cached_property
 
 import numpy as np
+from numpy.typing import NDArray
 from scipy.linalg import solve_triangular
 from scipy.spatial.distance import cdist
 
@@ -51,7 +52,7 @@ class Field:
     def _scaled(self) -> Array:
         return self.nodes_part @ self.scaling
 
-    def on(self, face: Array, bary: Array) -> tuple[Array, Array]:
+    def on(self, face: NDArray, bary: Array) -> tuple[Array, Array]:
         """Return the displacement (n,), mm, and its gradient along the surface (n, 3) at barycentrics of faces."""
         points, normals = self.curved.evaluate(face, bary)
         f, g = self.everywhere(points, normals, self.curved.shape_operator(face, bary))

@@ -82,18 +82,13 @@ def fit_field(
     if used.sum() < LEAST_NODES:
         return nothing(f"only {int(used.sum())} patches of readings lie on the surface")
     few = gather(patches, rows, used, T_base_part, setup, LEARNED)
-    if len(few) < LEAST_NODES:
-        return nothing(f"the readings amount to {len(few)} independent places, fewer than {LEAST_NODES}")
-    if few.rows.has_path and few.passes < LEAST_PASSES:
-        return nothing(f"{few.passes} passes cannot tell the part's shape from the robot's wandering")
-    size, swath = 2.0 * problem.half_size_mm, setup.probe.swath_mm
-    few, evidence = _learn(few, size, swath)
-    if evidence.gain < LEAST_GAIN:
+    too_few = _too_few(few)
+    if too_few:
+        return nothing(too_few)
+    few, evidence = _learn(few, 2.0 * problem.half_size_mm, setup.probe.swath_mm)
+    cv, cv_rigid = _foretold(few, evidence)
+    if evidence.gain < LEAST_GAIN or cv >= cv_rigid:
         return nothing("what is left after the rigid alignment is explained by noise", evidence)
-    cv = foretold_rms_mm(few, solve_nodes(few, evidence.theta, evidence.axes))
-    cv_rigid = foretold_rms_mm(few, solve_nodes(few, evidence.without, evidence.axes, with_field=False))
-    if cv >= cv_rigid:
-        return nothing("passes do not foretell each other better with a deformation than without", evidence)
     around = samples_of(curved)
     carry = _Carrier(curved, setup, patches, evidence.theta, evidence.axes, around)
     field = carry.field(rows, used, T_base_part, None)
@@ -119,6 +114,22 @@ def _learn(nodes: Nodes, size_mm: float, swath_mm: float) -> tuple[Nodes, Eviden
     return nodes, weigh(nodes, size_mm, swath_mm)
 
 
+def _too_few(nodes: Nodes) -> str | None:
+    """Return why these nodes cannot tell a deformation, if they cannot."""
+    if len(nodes) < LEAST_NODES:
+        return f"the readings amount to {len(nodes)} independent places, fewer than {LEAST_NODES}"
+    if nodes.rows.has_path and nodes.passes < LEAST_PASSES:
+        return f"{nodes.passes} passes, fewer than {LEAST_PASSES}, cannot tell a deformation from the robot's wandering"
+    return None
+
+
+def _foretold(nodes: Nodes, found: Evidence) -> tuple[float, float]:
+    """Return how well (rms, mm) passes foretell each other with a field, and without."""
+    with_field = solve_nodes(nodes, found.theta, found.axes)
+    without = solve_nodes(nodes, found.without, found.axes, with_field=False)
+    return foretold_rms_mm(nodes, with_field), foretold_rms_mm(nodes, without)
+
+
 def _turned(xi_base: Array, T_base_part: Transform) -> Array:
     """Return a motion about the centroid in axes of `part`."""
     inverse = T_base_part.inv()
@@ -136,9 +147,7 @@ class _Carrier:
     axes: Array
     around: Surroundings
 
-    def field(
-        self, rows: Rows, used: NDArray[np.bool_], T: Transform, before: Field | None
-    ) -> Field:
+    def field(self, rows: Rows, used: NDArray[np.bool_], T: Transform, before: Field | None) -> Field:
         """Return the field of residuals at a placement; `before`: a first field, whose slope lengthens the distances."""
         if before is not None:
             rows = replace(rows, r=rows.r + self.lengthened(rows, before, T))

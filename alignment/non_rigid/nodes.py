@@ -22,14 +22,13 @@ LONE_MM, LONE_SIGMAS = 1.0, 8.0
 class Nodes:
     """n nodes. deviation_mm (n,): how far the part stands out of its CAD along the normal, mean over the node.
 
-    points_part (n, 3): mean foot, `part`, mm. height_mm (n,): distance from which it was measured. rows: the same nodes
+    points_part (n, 3): mean foot, `part`, mm. rows: the same nodes
     as the noise model knows them, whose design x (n, 6) is the normal displacement of motions about the centroid, in
     prior standard deviations, axes of base. scatter_mm: of a single reading.
     """
 
     deviation_mm: Array
     points_part: Array
-    height_mm: Array
     rows: NoiseRows
     scatter_mm: float
 
@@ -48,7 +47,7 @@ class Nodes:
             r.r[keep], r.x[keep], r.count[keep], r.block[keep], r.across[keep], r.position_base[keep], r.size_mm,
             r.block_from_mm, r.block_to_mm, r.block_pass, r.edge[keep],
         )  # fmt: skip
-        return Nodes(self.deviation_mm[keep], self.points_part[keep], self.height_mm[keep], rows, self.scatter_mm)
+        return Nodes(self.deviation_mm[keep], self.points_part[keep], rows, self.scatter_mm)
 
 
 def believable(patches: Patches, rows: Rows, setup: Setup) -> NDArray[np.bool_]:
@@ -100,11 +99,11 @@ def gather(
     across = mean(cells.across_mm[picked])[:, 0] / max(0.5 * setup.probe.swath_mm, 1e-9)
     gap = cKDTree(position).query(position, 2)[0][:, 1] if n > 1 else np.ones(1)
     noise = NoiseRows(
-        r, mean(rows.jacobian[picked] * prior), total, block.astype(np.int32), across, position, float(np.median(gap)),
+        r, mean(rows.jacobian[picked] * prior), total.astype(np.float64), block.astype(np.int32), across, position,
+        float(np.median(gap)),
         s_from, s_to, pass_id, np.zeros(n, dtype=bool),
     )  # fmt: skip
-    height = mean(patches.distance_mm[picked])[:, 0]
-    return Nodes(-r, T_base_part.inv().points(position), height, noise, patches.sigma_mm)
+    return Nodes(-r, T_base_part.inv().points(position), noise, patches.sigma_mm)
 
 
 def _in_space(points: Array, most: int) -> tuple[NDArray[np.intp], int]:

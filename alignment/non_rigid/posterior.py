@@ -47,7 +47,7 @@ def solve_nodes(nodes: Nodes, theta: Array, axes: Array, with_field: bool = True
             "scan",
         ) from None
     alpha = cho_solve((lower, True), nodes.deviation_mm, check_finite=False)
-    return Solved(lower, alpha, cho_solve((lower, True), np.eye(len(nodes)), check_finite=False))
+    return Solved(np.asarray(lower), alpha, cho_solve((lower, True), np.eye(len(nodes)), check_finite=False))
 
 
 def belonging(nodes: Nodes, theta: Array, axes: Array) -> NDArray[np.bool_]:
@@ -78,7 +78,7 @@ def foretold_rms_mm(nodes: Nodes, solved: Solved) -> float:
     else:
         flat = nodes.points_part - nodes.points_part.mean(axis=0)
         along = flat @ np.linalg.svd(flat, full_matrices=False)[2][0]
-        group = np.argsort(np.argsort(along)) * BLOCKS // len(along)
+        group = (np.argsort(np.argsort(along)) * BLOCKS // len(along)).astype(np.int32)
     error = np.zeros(len(nodes))
     for name in np.unique(group):
         at = np.flatnonzero(group == name)

@@ -3,6 +3,7 @@
 from dataclasses import dataclass, replace
 
 import numpy as np
+from numpy.typing import NDArray
 from scipy.spatial import cKDTree
 
 from alignment.non_rigid.field import Field
@@ -23,7 +24,7 @@ TILT_SHARE = 0.5
 class Surroundings:
     """m samples: points, normals (m, 3), shape operators (m, 3, 3), `part`; face (m,), bary (m, 3)."""
 
-    face: Array
+    face: NDArray[np.int32]
     bary: Array
     points: Array
     normals: Array

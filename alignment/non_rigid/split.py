@@ -11,9 +11,7 @@ from planner.frames import Array, Transform
 SLIDE_COST = 0.1
 
 
-def rigid_part(
-    found: Field, around: Surroundings, T_base_part: Transform, directions: tuple[Direction, ...]
-) -> Array:
+def rigid_part(found: Field, around: Surroundings, T_base_part: Transform, directions: tuple[Direction, ...]) -> Array:
     """Return the motion xi (6,), rad and mm, axes of `base` about the centroid, that explains most of the field.
 
     Least squares over the supported area of normal displacement, with slides along the surface at a cost; only in

@@ -9,18 +9,17 @@ from typing import Any, Literal
 
 import numpy as np
 
-from alignment.correction import Correction
 from alignment.estimate.align import align
-from alignment.metrics import expected
 from app.plan import Artifacts, Plan, load_plan
 from app.report.build import Deviation, ReportData, report_html
 from app.steps.corrections import last_correction
+from app.steps.non_rigid import Followed, follow
 from app.steps.programs import ExportedProgram, export_path, program_name
 from app.steps.scans import cloud_of, read_scans
+from kuka_export.options import ProgramOptions
 from planner.errors import EchoBaseError
 from planner.frames import Transform
 from planner.issues import Issue
-from planner.path.decimate import decimate
 from planner.placement import assume_nominal, corrected_base, part_from_correction
 
 Progress = Callable[[float, str], None]
@@ -70,7 +69,10 @@ def run_align(folder: Path, scans: Sequence[Path], options: AlignOptions, progre
     last = options.last_correction
     cloud = cloud_of(read, setup, options.base, None if last is None else corrected_base(setup.T_world_base, last))
     progress(0.3, "aligning")
-    found = align(cloud, plan.curved, plan.keypoints, setup, plan.inspection, options.method, options.edges)
+    rigid = align(cloud, plan.curved, plan.keypoints, setup, plan.inspection, options.method, options.edges)
+    progress(0.6, "looking for a deformation")
+    followed = follow(plan, cloud, rigid, options.non_rigid)
+    found = followed.found
     content = found.to_json()
     content["inputs"] = {
         "part_sha256": plan.part.provenance.sha256,
@@ -81,15 +83,17 @@ def run_align(folder: Path, scans: Sequence[Path], options: AlignOptions, progre
     program = None
     if not found.failed:
         progress(0.8, "writing the corrected program")
-        program = _corrected_program(plan, found, content)
+        program = _corrected_program(plan, followed, content)
         content["program"] = program.manifest if program else None
     progress(0.9, "writing the report")
     artifacts: Artifacts = {
         "correction/correction.json": (json.dumps(content, indent=1, allow_nan=False) + "\n").encode()
     }
-    deviation = _deviation(plan, found)
+    deviation = _deviation(plan, followed)
+    if followed.field_npz is not None:
+        artifacts["correction/field.npz"] = followed.field_npz
     artifacts["correction/report.html"] = report_html(
-        plan, _report_data(plan, found, content, deviation, program, [(s.name, s.sha256) for s in read])
+        plan, _report_data(followed, content, deviation, program, [(s.name, s.sha256) for s in read])
     )
     if program:
         artifacts |= program.files
@@ -98,21 +102,22 @@ def run_align(folder: Path, scans: Sequence[Path], options: AlignOptions, progre
     return Alignment(content, artifacts, issues, content["verdict"] == "fail", deviation)
 
 
-def _corrected_program(plan: Plan, found: Correction, content: dict[str, Any]) -> ExportedProgram | None:
+def _corrected_program(plan: Plan, followed: Followed, content: dict[str, Any]) -> ExportedProgram | None:
     """Return the corrected inspection program; if it cannot be written the verdict in `content` becomes fail."""
-    sent = decimate(plan.inspection)
+    found = followed.found
     notes = [f"verdict {content['verdict']}: {i.message}" for i in found.issues if i.severity != "info"]
     accepted = "" if found.verdict == "pass" else "NOT GIVEN YET; THE VERDICT IS PARTIAL, READ THE REPORT FIRST"
     try:
         return export_path(
             plan,
-            sent,
-            plan.inspection,
+            followed.sent,
+            followed.dense,
             program_name(plan.part, "corrected"),
             T_base_basecorr=found.T_base_basecorr,
             notes=notes,
             verdict=found.verdict,
             acceptance=accepted,
+            options=ProgramOptions(adapted=followed.adapted),
         )
     except EchoBaseError as error:
         content["verdict"] = "fail"
@@ -120,8 +125,9 @@ def _corrected_program(plan: Plan, found: Correction, content: dict[str, Any]) -
         return None
 
 
-def _deviation(plan: Plan, found: Correction) -> Deviation:
+def _deviation(plan: Plan, followed: Followed) -> Deviation:
     """Return the deviation map: each measured patch against the part where the plan believed it, and where it was found."""
+    found = followed.found
     if found.T_base_basecorr is None or not len(found.points_base):
         return Deviation(np.zeros((0, 3)), np.zeros(0), np.zeros(0))
     T_base_part = part_from_correction(found.T_base_basecorr, plan.setup.T_base_partnom)
@@ -129,23 +135,16 @@ def _deviation(plan: Plan, found: Correction) -> Deviation:
     measured_base = found.points_base + found.deviation_mm[:, None] * T_base_part.directions(on_part.normals)
     nominal = assume_nominal(plan.setup.T_base_partnom).inv()
     before = plan.curved.closest(nominal.points(measured_base)).distance_mm
-    return Deviation(on_part.points, before, found.deviation_mm)
+    return Deviation(on_part.points, before, followed.deviation_after_mm)
 
 
 def _report_data(
-    plan: Plan,
-    found: Correction,
+    followed: Followed,
     content: dict[str, Any],
     deviation: Deviation,
     program: ExportedProgram | None,
     scans: list[tuple[str, str]],
 ) -> ReportData:
-    setup = plan.setup
-    T_nominal = assume_nominal(setup.T_base_partnom)
-    before = after = None
-    if found.T_base_basecorr is not None:
-        T_base_part = part_from_correction(found.T_base_basecorr, setup.T_base_partnom)
-        before = expected(plan.curved, plan.inspection, setup, T_base_part)
-        after = expected(plan.curved, plan.inspection, setup, T_nominal)
     manifest = program.manifest if program else None
-    return ReportData(content, before, after, deviation, found.baseline_xyzabc, manifest, scans)
+    baseline = followed.found.baseline_xyzabc
+    return ReportData(content, followed.before, followed.after, deviation, baseline, manifest, scans)

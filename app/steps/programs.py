@@ -10,6 +10,7 @@ from typing import Any, Literal
 from app.plan import Artifacts, Plan
 from kuka_export.dense import dense_csv
 from kuka_export.export import export
+from kuka_export.options import DEFAULT_OPTIONS, ProgramOptions
 from kuka_export.reader import KrlReading, read_program
 from kuka_export.runsheet import run_sheet_html, run_sheet_text
 from planner.errors import fail
@@ -47,6 +48,7 @@ def export_path(
     notes: Sequence[str] = (),
     verdict: Literal["pass", "partial", "fail"] | None = None,
     acceptance: str = "",
+    options: ProgramOptions = DEFAULT_OPTIONS,
 ) -> ExportedProgram:
     """Build, write and prove the program of a decimated path; raise EchoBaseError rather than hand out a faulty one.
 
@@ -64,6 +66,7 @@ def export_path(
         centroid_base_mm=setup.T_base_partnom.points(plan.surface.centroid_part),
         verdict=verdict,
         acceptance=acceptance,
+        options=options,
     )
     extra = {
         "manifest.json": (json.dumps(done.manifest, indent=1, allow_nan=False) + "\n").encode(),

@@ -4,6 +4,7 @@ from dataclasses import replace
 from typing import Protocol
 
 import numpy as np
+from numpy.typing import NDArray
 
 from planner.errors import fail
 from planner.frames import Array, Transform
@@ -15,7 +16,7 @@ from planner.toolpath import Role, ToolPath
 class NormalField(Protocol):
     """A smooth displacement of a surface along its outward normals."""
 
-    def on(self, face: Array, bary: Array) -> tuple[Array, Array]:
+    def on(self, face: NDArray, bary: Array) -> tuple[Array, Array]:
         """Return the displacement (n,), mm, and its gradient along the surface (n, 3) at barycentrics of faces."""
         ...
 

@@ -1,0 +1,207 @@
+"""The part that sprang back: the field behind a rigid alignment, for its prediction, and for the poses where asked for."""
+
+import io
+from dataclasses import dataclass, replace
+from typing import Any
+
+import numpy as np
+
+from alignment.cloud import PointCloud
+from alignment.correction import Correction
+from alignment.estimate.align import residual_of
+from alignment.estimate.verdict import limit_issues, nominal_shift, residual_issues, verdict_of
+from alignment.metrics import Expected, expected
+from alignment.non_rigid import Field, FieldFit, SprungSurface, fit_field
+from alignment.non_rigid.support import EVERYWHERE
+from app.plan import Plan
+from planner.checks import check
+from planner.frames import Array, Transform
+from planner.issues import Issue
+from planner.path.adapt import adapt
+from planner.path.decimate import decimate
+from planner.placement import assume_nominal, correction, part_from_correction
+from planner.surface.curved import CurvedSurface
+from planner.toolpath import ToolPath
+
+PARTIAL = ("not-rigid", "harmful", "non-rigid-support")
+# What a rigid verdict says of the misfit; said again of what is left after the field.
+ABOUT_MISFIT = ("not-rigid", "residual-large", "limit-displacement", "limit-rotation", "scan-of-another-part")
+# Share of the inspection's data poses that must stand where the data determine the field.
+ENOUGH_POSES = 0.99
+# Share of the patches on the surface that must agree with the deformed part.
+ENOUGH_PATCHES = 0.6
+
+
+@dataclass(frozen=True, eq=False)
+class Followed:
+    """found: the correction, with the field in it if it was applied. dense, sent: inspection path and its decimation.
+
+    before, after: what the inspection sees of the part as measured. deviation_after_mm (p,): rest at `found.points_base`.
+    field_npz: the field as an artifact, or None.
+    """
+
+    found: Correction
+    dense: ToolPath
+    sent: ToolPath
+    adapted: bool
+    before: Expected | None
+    after: Expected | None
+    deviation_after_mm: Array
+    field_npz: bytes | None
+
+
+def follow(plan: Plan, cloud: PointCloud, found: Correction, adapt_poses: bool) -> Followed:
+    """Return what the inspection will meet, with the part's shape in it; poses follow it if `adapt_poses`."""
+    if found.T_base_basecorr is None:
+        return Followed(found, plan.inspection, plan.inspection, False, None, None, found.deviation_mm, None)
+    T = part_from_correction(found.T_base_basecorr, plan.setup.T_base_partnom)
+    fit = fit_field(cloud, plan.curved, plan.setup, T, found.directions if adapt_poses else ())
+    if fit.field is None:
+        if adapt_poses:
+            found = _refused(found, fit)
+        return _rigid(plan, found, plan.curved, T, None)
+    if adapt_poses:
+        return _adapted(plan, found, fit, fit.field)
+    found = replace(found, non_rigid=figures(fit, fit.field) | {"applied": False, "reason": "aligned as a rigid part"})
+    return _rigid(plan, found, _as_measured(plan, fit.field), T, fit.field)
+
+
+def _as_measured(plan: Plan, field: Field) -> SprungSurface:
+    """Return the part as best known, also where the data say little."""
+    return SprungSurface(plan.curved, replace(field, support=EVERYWHERE))
+
+
+def _rigid(plan: Plan, found: Correction, surface: CurvedSurface, T: Transform, field: Field | None) -> Followed:
+    before, after = _seen(plan, surface, plan.inspection, T)
+    found = replace(found, before=before.summary, after=after.summary)
+    npz = None if field is None else field_npz(field, plan.curved)
+    sent = decimate(plan.inspection)
+    return Followed(found, plan.inspection, sent, False, before, after, found.deviation_mm, npz)
+
+
+def _seen(plan: Plan, surface: CurvedSurface, path: ToolPath, T_base_part: Transform) -> tuple[Expected, Expected]:
+    setup = plan.setup
+    nominal = assume_nominal(setup.T_base_partnom)
+    return expected(surface, plan.inspection, setup, T_base_part), expected(surface, path, setup, nominal)
+
+
+def _refused(found: Correction, fit: FieldFit) -> Correction:
+    issue = Issue(
+        "info",
+        "non-rigid-refused",
+        f"no deformation is followed: {fit.reason}.",
+        "The rigid correction stands; scan more passes if the part is known to have sprung back.",
+        "scan",
+    )
+    record = {"applied": False, "reason": fit.reason, "evidence": fit.gain}
+    return replace(found, non_rigid=record, issues=(*found.issues, issue))
+
+
+def _adapted(plan: Plan, found: Correction, fit: FieldFit, field: Field) -> Followed:
+    setup, T = plan.setup, fit.T_base_part
+    surface = _as_measured(plan, field)
+    dense = adapt(plan.inspection, plan.curved, field)
+    sent = decimate(dense)
+    before, after = _seen(plan, surface, dense, T)
+    residual = residual_of(fit.patches, replace(fit.rows, r=fit.rest_mm), fit.used)
+    T_base_basecorr = correction(T, setup.T_base_partnom)
+    issues = [i for i in found.issues if i.code not in ABOUT_MISFIT]
+    issues += limit_issues(*nominal_shift(setup, T, plan.surface.centroid_part), setup)
+    issues += residual_issues(residual.rms_mm, setup)
+    issues += _shape_issues(plan, fit, field)
+    issues += [
+        replace(i, where=f"corrected: {i.where}" if i.where else "corrected")
+        for i in check(SprungSurface(plan.curved, field), sent, setup).issues
+        if i.severity == "error"
+    ]
+    picked = np.flatnonzero(fit.used)
+    found = replace(
+        found,
+        verdict=verdict_of(issues, PARTIAL),  # type: ignore[arg-type]
+        T_base_basecorr=T_base_basecorr,
+        centroid_mm=T.points(plan.surface.centroid_part),
+        residual=residual,
+        before=before.summary,
+        after=after.summary,
+        issues=tuple(issues),
+        non_rigid=figures(fit, field) | {"applied": True, "reason": None},
+        points_base=fit.rows.foot_base[picked],
+        deviation_mm=-fit.rows.r[picked],
+    )
+    return Followed(found, dense, sent, True, before, after, -fit.rest_mm[picked], field_npz(field, plan.curved))
+
+
+def _shape_issues(plan: Plan, fit: FieldFit, field: Field) -> list[Issue]:
+    """Return what stands in the way of trusting the field: too little of the scan agrees, or poses stand beyond it."""
+    out = []
+    valid, kept = int(fit.rows.valid.sum()), int(fit.used.sum())
+    if kept < ENOUGH_PATCHES * valid:
+        out.append(
+            Issue(
+                "error",
+                "scan-of-another-part",
+                f"only {kept} of {valid} patches of the scan agree with the part, deformed or not.",
+                "Check that this is a scan of this part.",
+                "scan",
+            )
+        )
+    poses = plan.inspection.take(plan.inspection.is_data)
+    on = field.support.weight(poses.Ts_part_contact.xyz_mm)[0] >= 1.0 - 1e-6
+    if field.support.complete or on.mean() >= ENOUGH_POSES:
+        return out
+    out.append(
+        Issue(
+            "warning",
+            "non-rigid-support",
+            f"the scan determines the deformation over {field.support.share:.0%} of the surface; {int((~on).sum())} of "
+            f"{len(on)} inspection poses stand beyond and fall back to the rigid part.",
+            "Add key points or passes there and scan again.",
+            "alignment",
+        )
+    )
+    return out
+
+
+def figures(fit: FieldFit, field: Field) -> dict[str, Any]:
+    """Return what correction.json says of a field. Displacements are those beyond what BASE takes up, mm."""
+    assert fit.samples is not None
+    around = fit.samples
+    f, g = field.on(around.face, around.bary)
+    inside = field.support.value >= 1.0
+    sigma = field.support.sigma_mm[inside] if inside.any() else field.support.sigma_mm
+    along, across = field.lengths_mm
+    return {
+        "field_rms_mm": float(np.sqrt(np.mean(f**2))),
+        "field_max_mm": float(np.abs(f).max()),
+        "slope_max_deg": float(np.degrees(np.linalg.norm(g, axis=1).max())),
+        "length_mm": float(min(along, across)),
+        "length_along_mm": float(along),
+        "length_across_mm": float(across),
+        "sigma_max_mm": float(sigma.max()),
+        "support_share": field.support.share,
+        "evidence": fit.gain,
+        "foretold_rms_mm": fit.cv_mm,
+        "foretold_rigid_rms_mm": fit.cv_rigid_mm,
+    }
+
+
+def field_npz(field: Field, curved: CurvedSurface) -> bytes:
+    """Return the field as arrays (no pickle): at nodes of equal area, and at the vertices of the surface, `part`, mm.
+
+    nodes (m, 3), values (m,), sd (m,), weight (m,): 1 where the data determine it. vertices (v, 3), vertex_values (v,).
+    """
+    support = field.support
+    foot = curved.closest(support.points_part)
+    vertices = curved.surface.vertices
+    at = curved.closest(vertices)
+    buffer = io.BytesIO()
+    np.savez_compressed(
+        buffer,
+        nodes=support.points_part,
+        values=field.on(foot.face, foot.bary)[0],
+        sd=support.sigma_mm,
+        weight=support.value,
+        vertices=vertices,
+        vertex_values=field.on(at.face, at.bary)[0],
+    )
+    return buffer.getvalue()
