@@ -1,0 +1,1 @@
+"""Parts that sprang back, against analytic surfaces and analytic fields."""
