@@ -1,0 +1,1 @@
+"""The ratios EchoBase publishes, measured in one run on one machine: `make bench`."""
