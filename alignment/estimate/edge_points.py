@@ -9,7 +9,6 @@ from dataclasses import dataclass, fields, replace
 import numpy as np
 from numpy.typing import NDArray
 from scipy.ndimage import median_filter, uniform_filter
-from scipy.optimize import nnls
 from scipy.special import ndtri
 
 from alignment.cloud import PointCloud
@@ -24,7 +23,12 @@ MOST_GAP_MM = 6.0
 PLATEAU_ALONG_MM, PLATEAU_ACROSS_MM = 12.0, 6.0
 # Shares of the plateau beyond which the S-curve says nothing about the place.
 SHARE_LIMITS = (0.02, 0.98)
-CURVE_LIMITS = (0.08, 0.92)
+# Beams tried: from Gaussian (0) to a sharp disc (1), half to twice as wide as the set-up says.
+BLENDS = (0.0, 0.25, 0.5, 0.75, 1.0)
+WIDTHS = np.geomspace(0.5, 2.0, 25)
+SIGMAS_PER_WIDTH = 2.3548
+# An error of a share beyond this is a splash, not a shape.
+MOST_ERROR = 0.1
 
 
 @dataclass(frozen=True, eq=False)
@@ -139,7 +143,7 @@ def _shares(cloud: PointCloud, line: PoseLine, probe: Probe) -> Array | None:
         a, k = amplitude[part], known[part]
         a = _mend(a, k, usual)
         plateau = np.full(a.shape, usual)
-        for level in (0.5, 0.85):
+        for level in (0.5, 0.85, 0.95):
             loud = a > level * plateau
             weight = uniform_filter(loud.astype(np.float64), (along, across), mode="constant")
             total = uniform_filter(np.where(loud, a, 0.0), (along, across), mode="constant")
@@ -178,9 +182,14 @@ def locate(points: EdgePoints, cosine: Array, beam_width_mm: float) -> EdgePoint
     Each of the two readings places the edge by its own share on the S-curve, the steeper part counting more; with both on
     the curve, its width all but cancels. Where both are off it, half way is all there is.
     """
-    low, high = SHARE_LIMITS
     gap = np.maximum(points.gap_mm * np.clip(cosine, 0.2, 1.0), 1e-9)
     curve = _fit_curve(points, gap, beam_width_mm)
+    return replace(points, at=_place(points, gap, curve))
+
+
+def _place(points: EdgePoints, gap: Array, curve: Array) -> Array:
+    """Return where the edge lies between the two readings (k,), 0..1, if this is the beam's S-curve."""
+    low, high = SHARE_LIMITS
     f, g = (np.clip(v, low, high) for v in (points.share_on, points.share_off))
     x_on, x_off = curve @ _inverse(f), -(curve @ _inverse(g))
     weight_on, weight_off = (np.exp(-(ndtri(v) ** 2)) for v in (f, g))
@@ -191,31 +200,29 @@ def locate(points: EdgePoints, cosine: Array, beam_width_mm: float) -> EdgePoint
     weight_on, weight_off = weight_on * on_curve[0] + 1e-9, weight_off * on_curve[1] + 1e-9
     single = (weight_on * x_on / gap + weight_off * (1.0 - x_off / gap)) / (weight_on + weight_off)
     chord = x_on / np.maximum(x_on + x_off, 1e-9)
-    at = np.where(on_curve[0] & on_curve[1], chord, single)
-    return replace(points, at=np.clip(at, 0.0, 1.0))
+    return np.clip(np.where(on_curve[0] & on_curve[1], chord, single), 0.0, 1.0)
 
 
 def _fit_curve(points: EdgePoints, gap: Array, beam_width_mm: float) -> Array:
-    """Return the weights (2,), mm, of a Gaussian's and a disc's inverse S-curves, from pairs that both lie on the curve.
+    """Return the weights (2,), mm, of a Gaussian's and a disc's inverse S-curves that explain the shares around crossings.
 
-    The distance between the two readings is known; the curve must bridge it. No beam is quite either, most lie between.
+    Of blends and widths about the -6 dB width of the set-up, the one with the least squared error of the shares, all
+    eight readings of a crossing taken: also those fully on and fully off the part tell how far the curve reaches.
     """
-    low, high = CURVE_LIMITS
-    f = points.window
-    on_curve = (f > low) & (f < high)
-    # Only what hangs together with the crossing: another edge may be near.
-    for j in (2, 1, 0):
-        on_curve[:, j] &= on_curve[:, j + 1] | (j == 2)
-        on_curve[:, 7 - j] &= on_curve[:, 6 - j] | (j == 2)
-    count = on_curve.sum(axis=1, keepdims=True)
-    place = np.arange(8)[None, :] * gap[:, None]
-    mean = lambda v: np.where(on_curve, v, 0.0).sum(axis=1, keepdims=True) / np.maximum(count, 1)  # noqa: E731
-    q = _inverse(np.clip(f, low, high))
-    rows = [(v - mean(v))[on_curve & (count > 1)] for v in q]
-    target = -(place - mean(place))[on_curve & (count > 1)]
-    guess = np.array([beam_width_mm / 5.0, beam_width_mm / 5.0])
-    weak = np.sqrt(0.5) * np.eye(2)
-    return nnls(np.vstack([np.stack(rows, axis=1), weak]), np.r_[target, weak @ guess])[0]
+    seen = np.isfinite(points.window)
+    if seen.sum() < 20:
+        return np.array([beam_width_mm / SIGMAS_PER_WIDTH, 0.0])
+    best, chosen = np.inf, np.zeros(2)
+    for blend in BLENDS:
+        for width in beam_width_mm * WIDTHS:
+            curve = np.array([(1.0 - blend) * width / SIGMAS_PER_WIDTH, 0.5 * blend * width])
+            inside = (_place(points, gap, curve)[:, None] - np.arange(-3, 5)) * gap[:, None]
+            table = curve @ _inverse(_SHARES)
+            error = np.interp(inside, table, _SHARES, left=0.0, right=1.0) - points.window
+            cost = float(np.mean(np.minimum(error[seen] ** 2, MOST_ERROR**2)))
+            if cost < best:
+                best, chosen = cost, curve
+    return chosen
 
 
 def _windows(share: Array, line: PoseLine, pose: NDArray, law: NDArray) -> Array:
@@ -232,6 +239,9 @@ def _windows(share: Array, line: PoseLine, pose: NDArray, law: NDArray) -> Array
 
 _DISC_X = np.linspace(-1.0, 1.0, 401)
 _DISC_SHARE = 0.5 + (np.arcsin(_DISC_X) + _DISC_X * np.sqrt(1.0 - _DISC_X**2)) / np.pi
+
+
+_SHARES = np.clip(np.linspace(0.0, 1.0, 201), 1e-4, 1.0 - 1e-4)
 
 
 def _inverse(share: Array) -> Array:

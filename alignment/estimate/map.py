@@ -26,7 +26,7 @@ from planner.surface.boundary import boundary
 from planner.surface.curved import CurvedSurface
 
 CELL_MM = 8.0
-MOST_CELLS = 30_000
+MOST_CELLS = 5_000
 SOLVE_STEPS = 10
 SOLVED_MM = 2e-5
 # A step this long (mm), after the capture, is the data pulling against a lock that cannot hold.
@@ -60,7 +60,7 @@ class MapFit:
 
 @dataclass(frozen=True, eq=False)
 class State:
-    """A placement, and the edges' bias, lag and phase (3,) or nothing (0,), in their sigmas."""
+    """A placement, and the edges' bias and lag (2,) or nothing (0,), in their sigmas."""
 
     T_base_part: Transform
     nuisance: Array

@@ -20,11 +20,9 @@ LAWS_PER_ROW = 12.0
 COARSENINGS = 20
 # What the beam's asymmetry and the detection may shift every crossing by, as a share of the beam width, and what a late
 # clock may shift it by along the travel (mm). Both are estimated along; opposite edges and passes tell them apart.
-BIAS_SHARE = 0.1
-LAG_SIGMA_MM = 0.2
-# What an imperfect S-curve may shift a crossing by, as a share of the gap between its readings, by where it lies in the gap.
-PHASE_SHARE = 0.02
-NUISANCES = 3
+BIAS_SHARE = 0.04
+LAG_SIGMA_MM = 0.1
+NUISANCES = 2
 
 
 @dataclass(frozen=True, eq=False)
@@ -43,7 +41,7 @@ class EdgeData:
 
 @dataclass(frozen=True, eq=False)
 class System:
-    """Patches used (p,) and, perhaps, crossings of edges. Unknowns: six of the motion, then edge bias, lag and phase."""
+    """Patches used (p,) and, perhaps, crossings of edges. Unknowns: six of the motion, then edge bias and lag."""
 
     problem: Problem
     patches: Patches
@@ -52,7 +50,7 @@ class System:
 
     @property
     def unknowns(self) -> int:
-        """6, or 9 with edges."""
+        """6, or 8 with edges."""
         return 6 if self.edges is None else 6 + NUISANCES
 
     def surface(self, T_base_part: Transform) -> Rows:
@@ -61,7 +59,7 @@ class System:
         return patch_rows(self.patches, p.curved, T_base_part, p.centre_mm(T_base_part))
 
     def rows(self, T_base_part: Transform, nuisance: Array) -> NoiseRows:
-        """Return the condensed rows at a placement, with the edges' nuisances as they stand (3,), in their sigmas."""
+        """Return the condensed rows at a placement, with the edges' nuisances as they stand (2,), in their sigmas."""
         p = self.problem
         swath = p.setup.probe.swath_mm
         surface = noise_rows(self.patches, self.surface(T_base_part), self.used, p.prior_sigma, swath)
@@ -72,14 +70,8 @@ class System:
 
 
 def nuisance_columns(edges: EdgeData, found: EdgeRows) -> Array:
-    """Return how the residuals of crossings change with edge bias, lag and phase (k, 3), per sigma of theirs."""
-    gap = edges.points.gap_mm
-    # Where the edge is, not where it was found: noise in the latter would explain itself.
-    place = edges.points.at + found.r / np.maximum(gap * found.cosine, 1e-3)
-    phase = np.sin(2.0 * np.pi * np.clip(place, 0.0, 1.0)) * gap
-    return np.column_stack(
-        [np.full(len(found.r), -edges.bias_sigma_mm), -LAG_SIGMA_MM * found.lag, PHASE_SHARE * phase]
-    )
+    """Return how the residuals of crossings change with edge bias and lag (k, 2), per sigma of theirs."""
+    return np.column_stack([np.full(len(found.r), -edges.bias_sigma_mm), -LAG_SIGMA_MM * found.lag])
 
 
 def _joined(surface: NoiseRows, edges: EdgeData, found: EdgeRows, prior_sigma: Array, nuisance: Array) -> NoiseRows:
@@ -106,7 +98,9 @@ def _joined(surface: NoiseRows, edges: EdgeData, found: EdgeRows, prior_sigma: A
     columns = nuisance_columns(edges, found)[picked]
     x = np.hstack([mean(found.jacobian[picked] * prior_sigma), mean(columns)])
     r = mean(found.r[picked] + columns @ nuisance)[:, 0]
-    s = mean(points.s_mm[picked])[:, 0]
+    s_from, s_to = np.full(n, np.inf), np.full(n, -np.inf)
+    np.minimum.at(s_from, at, points.s_mm[picked])
+    np.maximum.at(s_to, at, points.s_mm[picked])
     pass_id = np.zeros(n, dtype=np.int32)
     pass_id[at] = points.pass_id[picked]
     blocks = len(surface.block_from_mm)
@@ -119,8 +113,8 @@ def _joined(surface: NoiseRows, edges: EdgeData, found: EdgeRows, prior_sigma: A
         block=np.r_[surface.block, blocks + np.arange(n, dtype=np.int32)].astype(np.int32),
         across=np.r_[surface.across, np.zeros(n)],
         position_base=np.vstack([surface.position_base, mean(found.point_base[picked])]),
-        block_from_mm=np.r_[surface.block_from_mm, s],
-        block_to_mm=np.r_[surface.block_to_mm, s],
+        block_from_mm=np.r_[surface.block_from_mm, s_from],
+        block_to_mm=np.r_[surface.block_to_mm, s_to],
         block_pass=np.r_[surface.block_pass, pass_id].astype(np.int32),
         edge=np.r_[surface.edge, np.ones(n, dtype=bool)],
     )

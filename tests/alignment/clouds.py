@@ -45,26 +45,36 @@ def wander(rng, passes, spacing_mm, length_mm, columns=6, reset=False):
     return out
 
 
-def disc_share(surface, u, v, xa, ya, width_mm):
+def disc_share(surface, u, v, xa, ya, width_mm, points=300):
     """Share of a disc-shaped beam that falls on the part."""
-    k = np.arange(40)
-    radius, angle = np.sqrt((k + 0.5) / 40) * width_mm / 2, k * 2.399963
-    # Each point with its opposite, so that the half way point of the beam is its middle exactly.
-    radius, angle = np.r_[radius, radius], np.r_[angle, angle + np.pi]
     du, dv = surface.derivatives(u, v)
     a, b, c = (du * du).sum(1), (du * dv).sum(1), (dv * dv).sum(1)
     det = a * c - b * b
-    share = np.zeros(len(u))
-    for r, t in zip(radius, angle, strict=True):
-        offset = r * np.cos(t) * xa + r * np.sin(t) * ya
-        e, f = (offset * du).sum(1), (offset * dv).sum(1)
-        share += surface.inside(u + (c * e - b * f) / det, v + (a * f - b * e) / det)
-    return share / len(radius)
+
+    def inside(rows, radius, angle):
+        offset = radius * (np.cos(angle) * xa[rows] + np.sin(angle) * ya[rows])
+        e, f = (offset * du[rows]).sum(1), (offset * dv[rows]).sum(1)
+        step_u, step_v = (c[rows] * e - b[rows] * f) / det[rows], (a[rows] * f - b[rows] * e) / det[rows]
+        return surface.inside(u[rows] + step_u, v[rows] + step_v)
+
+    everywhere = np.arange(len(u))
+    rim = sum(inside(everywhere, 0.55 * width_mm, t).astype(int) for t in np.arange(8) * np.pi / 4)
+    share = (rim == 8).astype(float)
+    near = np.flatnonzero((rim > 0) & (rim < 8))
+    # Each point with its opposite, so that the half way point of the beam is its middle exactly.
+    k = np.arange(points // 2)
+    radius, angle = np.sqrt((k + 0.5) / len(k)) * width_mm / 2, k * 2.399963
+    total = np.zeros(len(near))
+    for r, t in zip(np.r_[radius, radius], np.r_[angle, angle + np.pi], strict=True):
+        total += inside(near, r, t)
+    share[near] = total / (2 * len(k))
+    return share
 
 
 def scan(
     surface: ParamSurface, setup: Setup, T_base_part: Transform, rng, u_range, v_values, spacing_mm=2.0, pose_mm=0.03,
-    pose_deg=0.005, correlation_mm=10.0, tof_mm=0.01, outliers=0.0, dropouts=0.0, reset=False, standoff_mm=15.0, field=None,
+    pose_deg=0.005, correlation_mm=10.0, tof_mm=0.01, amplitude_noise=0.02, outliers=0.0, dropouts=0.0,
+    reset=False, standoff_mm=15.0, field=None,
     true_setup=None, origin_map=None,
 ):  # fmt: skip
     """What a cell records: poses planned on the nominal surface, echoes of the true one at T_base_part."""
@@ -96,7 +106,7 @@ def scan(
     b, c = (np.degrees(np.arctan2((normal * axes[:, :, k]).sum(1), cos)) for k in (0, 1))
     loss = np.minimum(2.0 * b**2 + c**2, 20.0)
     share = disc_share(surface, u, v, axes[:, :, 0], axes[:, :, 1], setup.probe.beam_width_mm)
-    amplitude = 50.0 * 10 ** (-loss / 20) * share * (1 + 0.02 * rng.standard_normal(len(d)))
+    amplitude = 50.0 * 10 ** (-loss / 20) * share * (1 + amplitude_noise * rng.standard_normal(len(d)))
     d = d + tof_mm * rng.standard_normal(len(d))
     bad = (rng.random(len(d)) < outliers) & (amplitude >= 2.0)
     d = np.where(bad, standoff_mm * (0.2 + 1.8 * rng.random(len(d))), d)

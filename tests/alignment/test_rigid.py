@@ -24,7 +24,7 @@ def test_recovers_any_rigid_motion(seed, n):
 def test_noisy_weighted_fit_is_that_of_kabsch():
     rng = np.random.default_rng(3)
     p, w = rng.normal(0, 50, (20, 3)), rng.uniform(0.1, 3, 20)
-    q = [*Rotation.from_rotvec([0.1, -0.2, 0.3]).apply(p), 1, 2, 3, *rng.normal(0, 0.5, (20, 3))]
+    q = np.add(Rotation.from_rotvec([0.1, -0.2, 0.3]).apply(p), [1, 2, 3]) + rng.normal(0, 0.5, (20, 3))
     r, t = fit_rigid(p, q, w)
     p0, q0 = p - np.average(p, axis=0, weights=w), q - np.average(q, axis=0, weights=w)
     expected, _ = Rotation.align_vectors(q0, p0, weights=w)
@@ -42,7 +42,7 @@ def test_a_mirror_image_is_never_the_answer():
 @pytest.mark.parametrize(
     ("points", "code"),
     [
-        ([*np.zeros((2, 3)), [0, 0, 0], [1, 0, 0]], "points-too-few"),
+        (np.array([[0.0, 0, 0], [1, 0, 0]]), "points-too-few"),
         (np.outer(np.arange(5.0), [1, 2, 3]), "points-collinear"),
         (np.zeros((4, 3)), "points-collinear"),
     ],

@@ -1,0 +1,1 @@
+"""Benchmarks of the alignment: calibration of its claims, and speed beside other libraries."""
