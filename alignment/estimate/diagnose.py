@@ -61,7 +61,11 @@ def diagnose_fit(cloud: PointCloud, problem: Problem, found: MapFit) -> list[Iss
         hypotheses += place_hypotheses(problem.setup)
     better = _best(cloud, problem, max(sigma, _own_scatter(cloud, problem)), hypotheses, _beyond_limits(found, problem))
     if better is not None:
-        issues.append(Issue("error", better.code, better.message, better.remedy, "scan"))
+        # A scan that fits as it stands, only far from nominal, may be just that: two readings of it are possible, and
+        # the engineer who knows the fixture decides.
+        doubt = _beyond_limits(found, problem) and not lost
+        text = f"the part is far from its nominal place; or else {better.message}" if doubt else better.message
+        issues.append(Issue("warning" if doubt else "error", better.code, text, better.remedy, "scan"))
     valid = int(found.rows.valid.sum())
     kept = int(found.used.sum())
     if valid and kept < 0.6 * valid:

@@ -113,3 +113,14 @@ def test_two_standoffs_show_a_wrong_temperature():
     said = [i for i in found.issues if i.code == "sound-speed-wrong"]
     assert len(said) == 1
     assert abs(float(said[0].message.split(" m/s")[0].split()[-1]) - 1482.4 / warm) < 5.0
+
+
+def test_a_part_far_from_nominal_is_not_mistaken_for_a_wrong_unit():
+    """Nearer to the probe by 7 mm of 15: halved times of flight would look alike. Said, but the part is found."""
+    far = part_from_correction(
+        Transform.from_xyzabc("base", "basecorr", [1.1, -0.7, 7.0, 0.2, -0.2, 0.3]), CELL.T_base_partnom
+    )
+    found = align(scan(PANEL, CELL, far, np.random.default_rng(1), *LINES), CURVED, [], CELL)
+    assert found.verdict != "fail"
+    assert normal_error_mm(PANEL, far, part_from_correction(found.T_base_basecorr, CELL.T_base_partnom)) < 0.03
+    assert {i.code for i in found.issues if i.severity == "error"} == set()
