@@ -16,7 +16,10 @@ STEPS = 60
 FIELD_MM, FIELD_SPREAD = 0.1, 2.3
 LENGTH_SHARE, LENGTH_SPREAD = 0.4, 1.0
 # Lengths searched: from twice the distance of nodes to this many sizes of the part.
-LONGEST = 3.0
+LONGEST = 1.5
+# What stays the same over a longer path than this (mm) will be there again on the next one, part or robot, and is worth
+# following; only what is forgotten sooner is noise.
+FORGOTTEN_MM = 300.0
 STARTS = ((0.2, 0.2), (0.2, 1.0), (1.0, 0.3), (1.0, 1.0))
 
 
@@ -47,6 +50,7 @@ def weigh(nodes: Nodes, size_mm: float, swath_mm: float) -> Evidence:
     spread = float(np.clip(np.std(nodes.deviation_mm), 1e-3, 1e2))
     noise = [0, 1, 2, 3, 4] if nodes.rows.has_path else [0]
     low, high = centre - 6.0 * below, centre + 6.0 * above
+    high[2:4] = np.log(FORGOTTEN_MM)
     shortest = min(2.0 * nodes.rows.size_mm, 0.3 * size_mm)
     low[ALONG:], high[ALONG:] = np.log(shortest), np.log(LONGEST * size_mm)
 

@@ -1,6 +1,6 @@
 """`Field`: how far, in which slope and how surely the part stands out of its CAD, anywhere on the surface."""
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
@@ -9,7 +9,7 @@ from scipy.linalg import solve_triangular
 from scipy.spatial.distance import cdist
 
 from alignment.non_rigid.covariance import matern, matern_slope
-from alignment.non_rigid.support import EVERYWHERE, Support
+from alignment.non_rigid.support import Support
 from planner.frames import Array
 from planner.surface.curved import CurvedSurface
 
@@ -24,7 +24,8 @@ class Field:
     scaling (3, 3), 1/mm. motion (6,): the
     rigid rest (rx, ry, rz, x, y, z), rad and mm, axes of `part`, about centre_part (3,). lower (n, n): Cholesky factor of
     the nodes' covariance; design (n, 6): their motions in prior standard deviations `prior` (6,), axes of `part`.
-    support: where the data determine it; beyond, it fades to nothing.
+    support: where the data determine it. Beyond, it is the most probable continuation, which goes back to the rigid part
+    within a length of the kernel: to cut it off sooner would put a slope there that the part has not.
     """
 
     curved: CurvedSurface
@@ -36,7 +37,7 @@ class Field:
     lower: Array
     design: Array
     prior: Array
-    support: Support = field(default=EVERYWHERE)
+    support: Support | None = None
 
     @property
     def centre_part(self) -> Array:
@@ -55,14 +56,7 @@ class Field:
     def on(self, face: NDArray, bary: Array) -> tuple[Array, Array]:
         """Return the displacement (n,), mm, and its gradient along the surface (n, 3) at barycentrics of faces."""
         points, normals = self.curved.evaluate(face, bary)
-        f, g = self.everywhere(points, normals, self.curved.shape_operator(face, bary))
-        if not self.support.complete:
-            w, slope = self.support.weight(points)
-            f, g = w * f, w[:, None] * g + f[:, None] * tangential(slope, normals)
-        return f, g
-
-    def everywhere(self, points: Array, normals: Array, shape: Array) -> tuple[Array, Array]:
-        """Return displacement and gradient (n,), (n, 3) whether supported or not. shape (n, 3, 3): dn = W dp."""
+        shape = self.curved.shape_operator(face, bary)
         w, v = self.motion[:3], self.motion[3:]
         arm = points - self.centre_part
         moved = v + np.cross(w, arm)

@@ -92,7 +92,7 @@ def fit_field(
     around = samples_of(curved)
     carry = _Carrier(curved, setup, patches, evidence.theta, evidence.axes, around)
     field = carry.field(rows, used, T_base_part, None)
-    if field.support.share < LEAST_SUPPORT:
+    if field.support is None or field.support.share < LEAST_SUPPORT:
         return nothing("the readings determine a deformation hardly anywhere on the surface", evidence)
     xi = rigid_part(field, around, T_base_part, tuple(directions))
     T = moved(T_base_part, xi, problem.centre_mm(T_base_part))

@@ -7,7 +7,7 @@ from numpy.typing import NDArray
 from scipy.spatial import cKDTree
 
 from alignment.non_rigid.field import Field
-from alignment.non_rigid.support import Support, fading
+from alignment.non_rigid.support import Support
 from planner.frames import Array
 from planner.path.sampling import sample_equal_area
 from planner.setup import Setup
@@ -29,7 +29,6 @@ class Surroundings:
     points: Array
     normals: Array
     shape: Array
-    spacing_mm: float
 
     def __len__(self) -> int:
         return len(self.points)
@@ -39,8 +38,7 @@ def samples_of(curved: CurvedSurface) -> Surroundings:
     """Return samples all over the surface."""
     s = sample_equal_area(curved.surface.face_areas_mm2, SAMPLES)
     points, normals = curved.evaluate(s.face, s.bary)
-    spacing = float(np.sqrt(curved.surface.area_mm2 / SAMPLES))
-    return Surroundings(s.face, s.bary, points, normals, curved.shape_operator(s.face, s.bary), spacing)
+    return Surroundings(s.face, s.bary, points, normals, curved.shape_operator(s.face, s.bary))
 
 
 def supported(found: Field, around: Surroundings, setup: Setup) -> Field:
@@ -55,6 +53,4 @@ def supported(found: Field, around: Surroundings, setup: Setup) -> Field:
     steep = TILT_SHARE * float(np.radians(setup.tolerances.tilt_deg))
     away = cKDTree(found.nodes_part @ found.scaling).query(around.points @ found.scaling)[0]
     excess = np.maximum(np.maximum(sd / limit, slope / steep), away)
-    value = fading(excess)
-    share = float((value >= 1.0).mean())
-    return replace(found, support=Support(around.points, value, share, around.spacing_mm, sd, slope))
+    return replace(found, support=Support(around.points, excess <= 1.0, sd, slope))

@@ -32,7 +32,8 @@ def rigid_part(found: Field, around: Surroundings, T_base_part: Transform, direc
     moves = moves @ basis
     along = np.einsum("mi,mik->mk", normals, moves)
     slide = moves - normals[:, :, None] * along[:, None, :]
-    w = found.support.value if not found.support.complete else np.ones(len(around))
+    assert found.support is not None
+    w = found.support.inside.astype(np.float64)
     normal = (along * w[:, None]).T @ along
     slides = np.einsum("mik,m,mil->kl", slide, w, slide)
     system = normal + SLIDE_COST**2 * slides

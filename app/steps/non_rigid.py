@@ -11,8 +11,8 @@ from alignment.correction import Correction
 from alignment.estimate.align import residual_of
 from alignment.estimate.verdict import limit_issues, nominal_shift, residual_issues, verdict_of
 from alignment.metrics import Expected, expected
+from alignment.metrics.figures import Prediction
 from alignment.non_rigid import Field, FieldFit, SprungSurface, fit_field
-from alignment.non_rigid.support import EVERYWHERE
 from app.plan import Plan
 from planner.checks import check
 from planner.frames import Array, Transform
@@ -26,6 +26,8 @@ from planner.toolpath import ToolPath
 PARTIAL = ("not-rigid", "harmful", "non-rigid-support")
 # What a rigid verdict says of the misfit; said again of what is left after the field.
 ABOUT_MISFIT = ("not-rigid", "residual-large", "limit-displacement", "limit-rotation", "scan-of-another-part")
+# Suspicions that a better explanation dispels: laws in the wrong order make steps at every pass, no smooth shape.
+ABOUT_LAWS = ("laws-reversed", "array-turned")
 # Share of the inspection's data poses that must stand where the data determine the field.
 ENOUGH_POSES = 0.99
 # Share of the patches on the surface that must agree with the deformed part.
@@ -62,18 +64,35 @@ def follow(plan: Plan, cloud: PointCloud, found: Correction, adapt_poses: bool) 
         return _rigid(plan, found, plan.curved, T, None)
     if adapt_poses:
         return _adapted(plan, found, fit, fit.field)
+    found = _misfit_said(found, fit, plan)
     found = replace(found, non_rigid=figures(fit, fit.field) | {"applied": False, "reason": "aligned as a rigid part"})
-    return _rigid(plan, found, _as_measured(plan, fit.field), T, fit.field)
+    return _rigid(plan, found, SprungSurface(plan.curved, fit.field), T, fit.field)
 
 
-def _as_measured(plan: Plan, field: Field) -> SprungSurface:
-    """Return the part as best known, also where the data say little."""
-    return SprungSurface(plan.curved, replace(field, support=EVERYWHERE))
+def _misfit_said(found: Correction, fit: FieldFit, plan: Plan) -> Correction:
+    """Return the rigid correction with the misfit of all that is the part's, also what its robust fit left out (a dent)."""
+    all_of_it = residual_of(fit.patches, fit.rows, fit.used)
+    known = {i.code for i in found.issues}
+    new = [i for i in residual_issues(all_of_it.rms_mm, plan.setup) if not known & {i.code, "residual-large"}]
+    if not new and not known & {"not-rigid", "residual-large"}:
+        largest = float(np.abs(fit.rows.r[fit.used]).max())
+        new = [
+            Issue(
+                "warning",
+                "sprung-back",
+                f"the part differs smoothly from its CAD, by up to {largest:.2f} mm where it was scanned; the prediction "
+                "after the correction takes it into account.",
+                "Align with --non-rigid to follow its shape.",
+                "scan",
+            )
+        ]
+    issues = [*found.issues, *new]
+    return replace(found, issues=tuple(issues), verdict=verdict_of(issues))  # type: ignore[arg-type]
 
 
 def _rigid(plan: Plan, found: Correction, surface: CurvedSurface, T: Transform, field: Field | None) -> Followed:
     before, after = _seen(plan, surface, plan.inspection, T)
-    found = replace(found, before=before.summary, after=after.summary)
+    found = replace(found, before=_doubted(plan, before, field), after=_doubted(plan, after, field))
     npz = None if field is None else field_npz(field, plan.curved)
     sent = decimate(plan.inspection)
     return Followed(found, plan.inspection, sent, False, before, after, found.deviation_mm, npz)
@@ -83,6 +102,20 @@ def _seen(plan: Plan, surface: CurvedSurface, path: ToolPath, T_base_part: Trans
     setup = plan.setup
     nominal = assume_nominal(setup.T_base_partnom)
     return expected(surface, plan.inspection, setup, T_base_part), expected(surface, path, setup, nominal)
+
+
+def _doubted(plan: Plan, seen: Expected, field: Field | None) -> Prediction:
+    """Return the prediction with the field's own standard deviation in the spread of the standoff."""
+    if field is None or field.support is None:
+        return seen.summary
+    poses = plan.inspection.take(plan.inspection.is_data)
+    doubt = field.support.sigma_mm[field.support.nearest(poses.Ts_part_contact.xyz_mm)]
+    on = seen.on_part & np.isfinite(seen.distance_mm)
+    if not on.any():
+        return seen.summary
+    d, s = seen.distance_mm[on], doubt[on]
+    std = float(np.hypot(seen.summary.tof_std_mm, np.sqrt(np.mean(s**2))))
+    return replace(seen.summary, tof_std_mm=std, tof_range_mm=float((d + s).max() - (d - s).min()))
 
 
 def _refused(found: Correction, fit: FieldFit) -> Correction:
@@ -99,19 +132,21 @@ def _refused(found: Correction, fit: FieldFit) -> Correction:
 
 def _adapted(plan: Plan, found: Correction, fit: FieldFit, field: Field) -> Followed:
     setup, T = plan.setup, fit.T_base_part
-    surface = _as_measured(plan, field)
+    surface = SprungSurface(plan.curved, field)
     dense = adapt(plan.inspection, plan.curved, field)
     sent = decimate(dense)
     before, after = _seen(plan, surface, dense, T)
     residual = residual_of(fit.patches, replace(fit.rows, r=fit.rest_mm), fit.used)
     T_base_basecorr = correction(T, setup.T_base_partnom)
-    issues = [i for i in found.issues if i.code not in ABOUT_MISFIT]
+    explained = residual.rms_mm <= setup.tolerances.position_mm and field.lengths_mm.min() >= setup.probe.swath_mm
+    overtaken = (*ABOUT_MISFIT, *ABOUT_LAWS) if explained else ABOUT_MISFIT
+    issues = [i for i in found.issues if i.code not in overtaken]
     issues += limit_issues(*nominal_shift(setup, T, plan.surface.centroid_part), setup)
     issues += residual_issues(residual.rms_mm, setup)
     issues += _shape_issues(plan, fit, field)
     issues += [
         replace(i, where=f"corrected: {i.where}" if i.where else "corrected")
-        for i in check(SprungSurface(plan.curved, field), sent, setup).issues
+        for i in check(surface, sent, setup).issues
         if i.severity == "error"
     ]
     picked = np.flatnonzero(fit.used)
@@ -121,8 +156,8 @@ def _adapted(plan: Plan, found: Correction, fit: FieldFit, field: Field) -> Foll
         T_base_basecorr=T_base_basecorr,
         centroid_mm=T.points(plan.surface.centroid_part),
         residual=residual,
-        before=before.summary,
-        after=after.summary,
+        before=_doubted(plan, before, field),
+        after=_doubted(plan, after, field),
         issues=tuple(issues),
         non_rigid=figures(fit, field) | {"applied": True, "reason": None},
         points_base=fit.rows.foot_base[picked],
@@ -146,15 +181,16 @@ def _shape_issues(plan: Plan, fit: FieldFit, field: Field) -> list[Issue]:
             )
         )
     poses = plan.inspection.take(plan.inspection.is_data)
-    on = field.support.weight(poses.Ts_part_contact.xyz_mm)[0] >= 1.0 - 1e-6
-    if field.support.complete or on.mean() >= ENOUGH_POSES:
+    assert field.support is not None
+    on = field.support.covers(poses.Ts_part_contact.xyz_mm)
+    if on.mean() >= ENOUGH_POSES:
         return out
     out.append(
         Issue(
             "warning",
             "non-rigid-support",
             f"the scan determines the deformation over {field.support.share:.0%} of the surface; {int((~on).sum())} of "
-            f"{len(on)} inspection poses stand beyond and fall back to the rigid part.",
+            f"{len(on)} inspection poses stand beyond, where they go back to the rigid part.",
             "Add key points or passes there and scan again.",
             "alignment",
         )
@@ -165,9 +201,10 @@ def _shape_issues(plan: Plan, fit: FieldFit, field: Field) -> list[Issue]:
 def figures(fit: FieldFit, field: Field) -> dict[str, Any]:
     """Return what correction.json says of a field. Displacements are those beyond what BASE takes up, mm."""
     assert fit.samples is not None
+    assert field.support is not None
     around = fit.samples
     f, g = field.on(around.face, around.bary)
-    inside = field.support.value >= 1.0
+    inside = field.support.inside
     sigma = field.support.sigma_mm[inside] if inside.any() else field.support.sigma_mm
     along, across = field.lengths_mm
     return {
@@ -188,8 +225,9 @@ def figures(fit: FieldFit, field: Field) -> dict[str, Any]:
 def field_npz(field: Field, curved: CurvedSurface) -> bytes:
     """Return the field as arrays (no pickle): at nodes of equal area, and at the vertices of the surface, `part`, mm.
 
-    nodes (m, 3), values (m,), sd (m,), weight (m,): 1 where the data determine it. vertices (v, 3), vertex_values (v,).
+    nodes (m, 3), values (m,), sd (m,), supported (m,). vertices (v, 3), vertex_values (v,).
     """
+    assert field.support is not None
     support = field.support
     foot = curved.closest(support.points_part)
     vertices = curved.surface.vertices
@@ -200,7 +238,7 @@ def field_npz(field: Field, curved: CurvedSurface) -> bytes:
         nodes=support.points_part,
         values=field.on(foot.face, foot.bary)[0],
         sd=support.sigma_mm,
-        weight=support.value,
+        supported=support.inside,
         vertices=vertices,
         vertex_values=field.on(at.face, at.bary)[0],
     )

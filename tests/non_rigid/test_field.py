@@ -1,7 +1,5 @@
 """`Field`, its support and the displaced surface, against differences, against the textbook formula and against planes."""
 
-from dataclasses import replace
-
 import numpy as np
 import pytest
 from scipy.spatial.distance import cdist
@@ -9,7 +7,6 @@ from scipy.spatial.distance import cdist
 from alignment.non_rigid import Field, SprungSurface
 from alignment.non_rigid.covariance import NodeCovariance, matern, surface_axes
 from alignment.non_rigid.samples import samples_of
-from alignment.non_rigid.support import EVERYWHERE, Support, fading
 from tests.alignment.clouds import curved_of
 from tests.non_rigid import cases
 from tests.non_rigid.cases import CYLINDER, PLATE, measured
@@ -17,7 +14,7 @@ from tests.non_rigid.cases import CYLINDER, PLATE, measured
 RNG = np.random.default_rng(11)
 
 
-def field_on(part, alpha=None, motion=None, support=EVERYWHERE):
+def field_on(part, alpha=None, motion=None):
     curved = curved_of(part.surface)
     u = RNG.uniform(*part.surface.u, 60)
     v = RNG.uniform(*part.surface.v, 60)
@@ -29,7 +26,7 @@ def field_on(part, alpha=None, motion=None, support=EVERYWHERE):
     k = 0.25 * matern(cdist(nodes @ scaling, nodes @ scaling)) + design @ design.T + 0.01**2 * np.eye(60)
     alpha = np.linalg.solve(k, 0.3 * np.sin(nodes[:, 0] / 60.0)) if alpha is None else alpha
     motion = np.array([1e-3, -2e-3, 5e-4, 0.1, -0.2, 0.05]) if motion is None else motion
-    return Field(curved, nodes, alpha, motion, 0.5, scaling, np.linalg.cholesky(k), design, prior, support)
+    return Field(curved, nodes, alpha, motion, 0.5, scaling, np.linalg.cholesky(k), design, prior)
 
 
 @pytest.mark.parametrize("part", [CYLINDER, PLATE], ids=["cylinder", "plate"])
@@ -108,23 +105,6 @@ def test_derivatives_of_the_covariance_are_those_of_differences():
         down[i] -= 1e-4
         difference = sum(s * (covariance.noise(t)[0] + covariance.field(t)[0]) for s, t in ((1, up), (-1, down))) / 2e-4
         assert np.abs(difference - by[i]).max() < 1e-3 * max(np.abs(by[i]).max(), 1e-9)
-
-
-def test_a_fading_weight_has_its_own_slope():
-    points = PLATE.surface.point(*(g.ravel() for g in np.meshgrid(np.linspace(0, 300, 31), np.linspace(0, 200, 21))))
-    value = fading(points[:, 0] / 120.0)
-    support = Support(points, value, 0.4, 10.0, 0 * value, 0 * value)
-    at = RNG.uniform([80, 40, 0], [250, 160, 0.0001], (40, 3))
-    w, g = support.weight(at)
-    assert ((w >= 0) & (w <= 1)).all()
-    assert w[at[:, 0] < 85].min(initial=1.0) > 0.99
-    for t in np.eye(3)[:2]:
-        difference = (support.weight(at + 0.01 * t)[0] - support.weight(at - 0.01 * t)[0]) / 0.02
-        assert np.abs(difference - g @ t).max() < 1e-5
-    field = field_on(PLATE, support=support)
-    foot = field.curved.closest(at)
-    full = replace(field, support=EVERYWHERE)
-    assert np.allclose(field.on(foot.face, foot.bary)[0], w * full.on(foot.face, foot.bary)[0])
 
 
 def test_the_displaced_plane_is_a_tilted_plane():
