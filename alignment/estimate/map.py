@@ -83,7 +83,7 @@ def align_map(cloud: PointCloud, curved: CurvedSurface, setup: Setup, edges: boo
         robust = robust_fit(patches, problem, robust.T_base_part, replace(robust.edges, points=sharper))
     if robust.used.sum() < 6:
         return captured
-    system = System(problem, patches, robust.used, robust.edges)
+    system = System(problem, patches, robust.used, robust.edges).grouped(robust.T_base_part)
     state = State(robust.T_base_part, np.zeros(system.unknowns - 6))
     size = float(np.ptp(curved.surface.vertices, axis=0).max())
     rows = system.rows(state.T_base_part, state.nuisance)

@@ -47,6 +47,16 @@ class System:
     patches: Patches
     used: NDArray[np.bool_]
     edges: EdgeData | None = None
+    edge_row: NDArray[np.int64] | None = None
+
+    def grouped(self, T_base_part: Transform) -> "System":
+        """Return the system with its crossings shared out to rows once and for all, as they lie at this placement.
+
+        A noise model belongs to one sharing-out: rows that changed places under it would be weighted as others.
+        """
+        if self.edges is None:
+            return self
+        return replace(self, edge_row=_edge_row(self.edges, self.edges.rows(self.problem, T_base_part)))
 
     @property
     def unknowns(self) -> int:
@@ -66,7 +76,8 @@ class System:
         if self.edges is None:
             return surface
         found = self.edges.rows(p, T_base_part)
-        return _joined(surface, self.edges, found, p.prior_sigma, nuisance)
+        at = _edge_row(self.edges, found) if self.edge_row is None else self.edge_row
+        return _joined(surface, self.edges, found, at, p.prior_sigma, nuisance)
 
 
 def nuisance_columns(edges: EdgeData, found: EdgeRows) -> Array:
@@ -74,21 +85,35 @@ def nuisance_columns(edges: EdgeData, found: EdgeRows) -> Array:
     return np.column_stack([np.full(len(found.r), -edges.bias_sigma_mm), -LAG_SIGMA_MM * found.lag])
 
 
-def _joined(surface: NoiseRows, edges: EdgeData, found: EdgeRows, prior_sigma: Array, nuisance: Array) -> NoiseRows:
+def _edge_row(edges: EdgeData, found: EdgeRows) -> NDArray[np.int64]:
+    """Return the row of each used crossing: one stretch of a pass, one band of laws, one side of the part is one row."""
     picked = np.flatnonzero(edges.used)
     points, cell, laws = edges.points, EDGE_CELL_MM, LAWS_PER_ROW
+    leaving = (found.lag[picked] > 0).astype(np.int64)
+    side = np.where(np.abs(found.lag[picked]) > 0.3, leaving, 2 + _side(found, picked))
+    at = np.zeros(len(picked), dtype=np.int64)
     # Coarser along the stretch and across the laws until it fits; one row a pass and side is as coarse as it gets.
     for _ in range(COARSENINGS):
         stretch = np.floor(points.s_mm[picked] / cell).astype(np.int64)
         band = np.where(points.along[picked], np.floor(points.law[picked] / laws), 0).astype(np.int64)
-        leaving = (found.lag[picked] > 0).astype(np.int64)
-        side = np.where(np.abs(found.lag[picked]) > 0.3, leaving, 2 + _side(found, picked))
         key = np.column_stack([points.pass_id[picked], stretch, points.along[picked], band, side])
         _, at = np.unique(key, axis=0, return_inverse=True)
-        n = 1 + int(at.max(initial=-1))
-        if n <= MOST_EDGE_ROWS:
+        if int(at.max(initial=-1)) < MOST_EDGE_ROWS:
             break
         cell, laws = 1.3 * cell, 1.3 * laws
+    return at.astype(np.int64)
+
+
+def _joined(
+    surface: NoiseRows,
+    edges: EdgeData,
+    found: EdgeRows,
+    at: NDArray[np.int64],
+    prior_sigma: Array,
+    nuisance: Array,
+) -> NoiseRows:
+    picked, points = np.flatnonzero(edges.used), edges.points
+    n = 1 + int(at.max(initial=-1))
     count = np.bincount(at, minlength=n).astype(np.float64)
 
     def mean(values: Array) -> Array:
