@@ -40,7 +40,8 @@ def point_cloud(
             "ultrasonic readings and ready surface points cannot be mixed.",
             "Align them one after the other.",
         )
-    pieces, issues = [], []
+    pieces: list[dict[str, Any]] = []
+    issues: list[Issue] = []
     poses = passes = 0
     for scan_id, scan in enumerate(scans):
         issues += scan.issues

@@ -6,7 +6,7 @@ import sys
 os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")  # as the application sets it, before numpy is imported
 os.environ.setdefault("OMP_NUM_THREADS", "1")
 
-from runpy import run_module  # noqa: E402
+from runpy import run_module
 
 NAMES = {"loading": "benchmarks.loading", "planning": "benchmarks.planning", "alignment": "benchmarks.alignment.speed"}
 
