@@ -11,8 +11,8 @@ from functools import cached_property
 
 import numpy as np
 
-from alignment.estimate.noise_kernel import GAP, LENGTH, NUGGET, PATH, TILT, Kernel
-from alignment.non_rigid.nodes import Nodes
+from alignment.estimate.noise_kernel import GAP, LENGTH, NUGGET, PATH, TILT
+from alignment.non_rigid.nodes import Nodes, Track
 from planner.frames import Array
 
 ROOT5 = np.sqrt(5.0)
@@ -35,6 +35,23 @@ def matern_slope(distance: Array) -> Array:
     """Return q with grad_u k(u, x) = -q (u - x), u and x in lengths."""
     a = distance * ROOT5
     return np.asarray((5.0 / 3.0) * (1.0 + a) * np.exp(-a))
+
+
+def wander(track: Track, length_mm: float, gap_mm: float) -> Array:
+    """Return the correlation (n, n) of means over stretches of an exponential process along the path.
+
+    Means over stretches a and b, a gap d apart, of exp(-|s - t| / L): exp(-d / L) m(a) m(b), m(w) = (1 - exp(-w/L)) L/w, and
+    of one with itself 2 (w/L - 1 + exp(-w/L)) (L/w)^2. Between passes the robot travels `gap_mm` on top.
+    """
+    a, b = track.from_mm, track.to_mm
+    number = np.unique(track.pass_id, return_inverse=True)[1]
+    apart = np.maximum(np.maximum(a[:, None] - b[None, :], a[None, :] - b[:, None]), 0.0)
+    apart = apart + gap_mm * np.abs(number[:, None] - number[None, :])
+    w = np.maximum((b - a) / length_mm, 1e-4)
+    mean = -np.expm1(-w) / w
+    c = np.exp(apart / -length_mm) * np.outer(mean, mean)
+    np.fill_diagonal(c, 2.0 * (w + np.expm1(-w)) / w**2)
+    return np.asarray(c[np.ix_(track.block, track.block)])
 
 
 def surface_axes(points: Array) -> Array:
@@ -65,30 +82,33 @@ class NodeCovariance:
         return np.asarray((q.T[:, :, None] - q.T[:, None, :]) ** 2)
 
     @cached_property
-    def _kernel(self) -> Kernel:
-        return Kernel(self.nodes.rows)
-
-    @cached_property
     def rigid(self) -> Array:
         """Covariance (n, n) of what a rest of motion, as wide as the fixture's prior, makes of the nodes, mm2."""
-        x = self.nodes.rows.x
+        x = self.nodes.design
         return np.asarray(x @ x.T)
 
     def noise(self, theta: Array) -> tuple[Array, list[Array]]:
         """Return the covariance (n, n) of everything but the part, and its derivatives by the first five logarithms."""
-        v, rows = np.exp(theta), self.nodes.rows
-        nugget = v[0] ** 2 / rows.count
+        v, track = np.exp(theta), self.nodes.track
+        nugget = v[0] ** 2 / self.nodes.count
         k = np.diag(nugget + FLOOR_MM**2)
         by = [np.diag(2.0 * nugget)]
-        if not rows.has_path:
+        if not track.known:
             return k, by
-        c = self._kernel.path_correlation(v[2], v[3])
-        longer = (self._kernel.path_correlation(v[2] * np.exp(STEP), v[3]) - c) / STEP
-        wider = (self._kernel.path_correlation(v[2], v[3] * np.exp(STEP)) - c) / STEP
-        across = np.outer(rows.across, rows.across)
-        scale = v[1] ** 2 + v[4] ** 2 * across
-        by += [2.0 * v[1] ** 2 * c, scale * longer, scale * wider, 2.0 * v[4] ** 2 * across * c]
+        c = wander(track, v[2], v[3])
+        longer = (wander(track, v[2] * np.exp(STEP), v[3]) - c) / STEP
+        wider = (wander(track, v[2], v[3] * np.exp(STEP)) - c) / STEP
+        # An error of the pose shows in two nodes alike as far as they look the same way.
+        alike = v[1] ** 2 * self._alike
+        across = v[4] ** 2 * np.outer(track.across, track.across)
+        scale = alike + across
+        by += [2.0 * alike * c, scale * longer, scale * wider, 2.0 * across * c]
         return k + scale * c, by
+
+    @cached_property
+    def _alike(self) -> Array:
+        n = self.nodes.normals_part
+        return np.asarray(n @ n.T)
 
     def field(self, theta: Array) -> tuple[Array, list[Array]]:
         """Return the covariance (n, n) of the field, and its derivatives by its three logarithms."""

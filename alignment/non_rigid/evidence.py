@@ -48,10 +48,10 @@ def weigh(nodes: Nodes, size_mm: float, swath_mm: float) -> Evidence:
     below = np.r_[prior.below[list(NOISE)], FIELD_SPREAD, LENGTH_SPREAD, LENGTH_SPREAD]
     above = np.r_[prior.above[list(NOISE)], FIELD_SPREAD, LENGTH_SPREAD, LENGTH_SPREAD]
     spread = float(np.clip(np.std(nodes.deviation_mm), 1e-3, 1e2))
-    noise = [0, 1, 2, 3, 4] if nodes.rows.has_path else [0]
+    noise = [0, 1, 2, 3, 4] if nodes.track.known else [0]
     low, high = centre - 6.0 * below, centre + 6.0 * above
     high[2:4] = np.log(FORGOTTEN_MM)
-    shortest = min(2.0 * nodes.rows.size_mm, 0.3 * size_mm)
+    shortest = min(2.0 * nodes.size_mm, 0.3 * size_mm)
     low[ALONG:], high[ALONG:] = np.log(shortest), np.log(LONGEST * size_mm)
 
     def climb(start: Array, active: list[int]) -> tuple[Array, float]:

@@ -118,7 +118,7 @@ def _too_few(nodes: Nodes) -> str | None:
     """Return why these nodes cannot tell a deformation, if they cannot."""
     if len(nodes) < LEAST_NODES:
         return f"the readings amount to {len(nodes)} independent places, fewer than {LEAST_NODES}"
-    if nodes.rows.has_path and nodes.passes < LEAST_PASSES:
+    if nodes.track.known and nodes.passes < LEAST_PASSES:
         return f"{nodes.passes} passes, fewer than {LEAST_PASSES}, cannot tell a deformation from the robot's wandering"
     return None
 

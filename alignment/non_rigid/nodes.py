@@ -1,12 +1,12 @@
 """What the residuals of a scan say about the part's shape: some hundred nodes, each the mean of many readings."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
 from scipy.spatial import cKDTree
 
-from alignment.estimate.noise_rows import NoiseRows, coarse_of
+from alignment.estimate.noise_rows import coarse_of
 from alignment.estimate.patches import Patches
 from alignment.estimate.robust import mad_sigma
 from alignment.estimate.surface_rows import Rows
@@ -19,17 +19,38 @@ LONE_MM, LONE_SIGMAS = 1.0, 8.0
 
 
 @dataclass(frozen=True, eq=False)
+class Track:
+    """Where on the scanner's way n nodes lie. block (n,): row of the others, -1 without a way. across (n,): place on the
+    array, -1..1. from_mm, to_mm (b,): stretches of path; pass_id (b,): their passes."""
+
+    block: NDArray[np.int32]
+    across: Array
+    from_mm: Array
+    to_mm: Array
+    pass_id: NDArray[np.int32]
+
+    @property
+    def known(self) -> bool:
+        """False for ready surface points."""
+        return len(self.pass_id) > 0
+
+
+@dataclass(frozen=True, eq=False)
 class Nodes:
     """n nodes. deviation_mm (n,): how far the part stands out of its CAD along the normal, mean over the node.
 
-    points_part (n, 3): mean foot, `part`, mm. rows: the same nodes
-    as the noise model knows them, whose design x (n, 6) is the normal displacement of motions about the centroid, in
-    prior standard deviations, axes of base. scatter_mm: of a single reading.
+    points_part, normals_part (n, 3): mean foot and normal, `part`, mm. design (n, 6): normal displacement by motions about
+    the centroid, in prior standard deviations, axes of base. count (n,): readings. size_mm: distance of nodes.
+    scatter_mm: of a single reading.
     """
 
     deviation_mm: Array
     points_part: Array
-    rows: NoiseRows
+    normals_part: Array
+    design: Array
+    count: Array
+    track: Track
+    size_mm: float
     scatter_mm: float
 
     def __len__(self) -> int:
@@ -38,16 +59,15 @@ class Nodes:
     @property
     def passes(self) -> int:
         """Number of passes, 0 without a path."""
-        return len(np.unique(self.rows.block_pass)) if self.rows.has_path else 0
+        return len(np.unique(self.track.pass_id))
 
     def only(self, keep: NDArray[np.bool_]) -> "Nodes":
         """Return the selected nodes."""
-        r = self.rows
-        rows = NoiseRows(
-            r.r[keep], r.x[keep], r.count[keep], r.block[keep], r.across[keep], r.position_base[keep], r.size_mm,
-            r.block_from_mm, r.block_to_mm, r.block_pass, r.edge[keep],
+        track = replace(self.track, block=self.track.block[keep], across=self.track.across[keep])
+        return Nodes(
+            self.deviation_mm[keep], self.points_part[keep], self.normals_part[keep], self.design[keep],
+            self.count[keep], track, self.size_mm, self.scatter_mm,
         )  # fmt: skip
-        return Nodes(self.deviation_mm[keep], self.points_part[keep], rows, self.scatter_mm)
 
 
 def believable(patches: Patches, rows: Rows, setup: Setup) -> NDArray[np.bool_]:
@@ -98,12 +118,12 @@ def gather(
     position = mean(rows.foot_base[picked])
     across = mean(cells.across_mm[picked])[:, 0] / max(0.5 * setup.probe.swath_mm, 1e-9)
     gap = cKDTree(position).query(position, 2)[0][:, 1] if n > 1 else np.ones(1)
-    noise = NoiseRows(
-        r, mean(rows.jacobian[picked] * prior), total.astype(np.float64), block.astype(np.int32), across, position,
-        float(np.median(gap)),
-        s_from, s_to, pass_id, np.zeros(n, dtype=bool),
+    T_part_base = T_base_part.inv()
+    return Nodes(
+        -r, T_part_base.points(position), T_part_base.directions(mean(rows.normal_base[picked])),
+        mean(rows.jacobian[picked] * prior), total.astype(np.float64),
+        Track(block.astype(np.int32), across, s_from, s_to, pass_id), float(np.median(gap)), patches.sigma_mm,
     )  # fmt: skip
-    return Nodes(-r, T_base_part.inv().points(position), noise, patches.sigma_mm)
 
 
 def _in_space(points: Array, most: int) -> tuple[NDArray[np.intp], int]:

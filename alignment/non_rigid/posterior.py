@@ -72,9 +72,8 @@ def belonging(nodes: Nodes, theta: Array, axes: Array) -> NDArray[np.bool_]:
 
 def foretold_rms_mm(nodes: Nodes, solved: Solved) -> float:
     """Return the rms (mm) of the error with which each pass is foretold by all others (blocks in space without passes)."""
-    rows = nodes.rows
-    if rows.has_path:
-        group = rows.block_pass[rows.block]
+    if nodes.track.known:
+        group = nodes.track.pass_id[nodes.track.block]
     else:
         flat = nodes.points_part - nodes.points_part.mean(axis=0)
         along = flat @ np.linalg.svd(flat, full_matrices=False)[2][0]
@@ -94,7 +93,7 @@ def field_of(
     fixture = setup.fixture
     prior = np.repeat([np.radians(fixture.sigma_deg), fixture.sigma_mm], 3)
     # The prior is the same about and along all axes, so it may be turned into those of the part.
-    design = np.hstack([nodes.rows.x[:, :3] @ turn, nodes.rows.x[:, 3:] @ turn])
+    design = np.hstack([nodes.design[:, :3] @ turn, nodes.design[:, 3:] @ turn])
     motion = prior * (design.T @ solved.alpha)
     return Field(
         curved, nodes.points_part, solved.alpha, motion, float(np.exp(theta[FIELD])),

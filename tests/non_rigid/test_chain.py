@@ -1,0 +1,100 @@
+"""From the CAD of a small wing to the assessed inspection of a sprung-back one: simulated, through the files users have."""
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from alignment.simulator import Noise, Truth, simulate, spring_back_field, true_shape, write_readings_csv
+from app.plan import load_plan
+from app.steps.align import AlignOptions, run_align
+from app.steps.assess import run_assess
+from app.steps.plan import PlanRequest, run_plan
+from app.steps.programs import active_base, read_folder
+from planner.frames import Transform
+from planner.setup import Setup
+from tests.loop.surfaces import wing, write_stl
+
+OFFSET = Transform.from_xyzabc("base", "basecorr", (1.1, -0.7, 1.0, 0.2, -0.3, 0.2))
+SETUP = Setup.model_validate(
+    {
+        "base": {"x_mm": 1000, "y_mm": 0, "z_mm": 700, "number": 2},
+        "placement": {"x_mm": 20},
+        "inspection": {"strategy": "plane"},
+    }
+)
+
+
+def quiet(share, text):
+    pass
+
+
+def put(folder: Path, files):
+    for name, content in files.items():
+        path = folder / name
+        path.parent.mkdir(parents=True, exist_ok=True)
+        path.write_bytes(content)
+
+
+@pytest.fixture(scope="module")
+def folder(tmp_path_factory):
+    out = tmp_path_factory.mktemp("wing")
+    skin = wing(length=300.0, chord=140.0, twist_deg=4.0, camber=12.0)
+    write_stl(out / "wing.stl", *skin.mesh(61, 31))
+    _, files = run_plan(PlanRequest(out / "wing.stl", "wing.stl", "mm", SETUP), quiet)
+    put(out, files)
+    return out
+
+
+def scan(folder, kind, truth, body, name, seed, outliers=0.0):
+    plan, reading = load_plan(folder), read_folder(folder, kind)
+    active = active_base(reading, plan.setup) if kind == "corrected" else None
+    noise = Noise(outliers=outliers)
+    taken = simulate(plan.part, plan.surface, reading.path, plan.setup, truth, noise, seed, active, body)
+    write_readings_csv(taken, folder / name)
+    return folder / name
+
+
+@pytest.mark.slow
+def test_a_twisted_part_moved_and_sprung_back(folder):
+    plan = load_plan(folder)
+    truth = Truth(OFFSET, spring_back_field(plan.surface, "twist", 1.5))
+    body = true_shape(plan.surface, truth)
+    taken = scan(folder, "alignment", truth, body, "scan.csv", 5, outliers=0.1)
+    figures, predicted = {}, {}
+    for non_rigid in (False, True):
+        done = run_align(folder, [taken], AlignOptions(non_rigid=non_rigid), quiet)
+        for old in (folder / "corrected").glob("*"):
+            old.unlink()
+        put(folder, done.artifacts)
+        assert done.correction["verdict"] == "pass"
+        assert done.correction["non_rigid"]["applied"] is non_rigid
+        inspected = scan(folder, "corrected", truth, body, "inspection.csv", 6)
+        figures[non_rigid] = run_assess(folder, inspected, None, quiet).content["after"]
+        predicted[non_rigid] = done.correction["prediction"]["after"]
+    assert figures[True]["tof_std_mm"] <= 0.05
+    assert figures[True]["tof_range_mm"] <= 0.5
+    assert figures[True]["within_2db"] == 1.0
+    assert figures[True]["tof_std_mm"] < 0.5 * figures[False]["tof_std_mm"]
+    # The rigid alignment knows what it leaves: its prediction is what the inspection then sees.
+    assert predicted[False]["tof_std_mm"] == pytest.approx(figures[False]["tof_std_mm"], rel=0.15)
+    assert predicted[False]["tof_range_mm"] == pytest.approx(figures[False]["tof_range_mm"], rel=0.25)
+    with np.load(folder / "correction" / "field.npz", allow_pickle=False) as arrays:
+        assert arrays["nodes"].shape == (len(arrays["values"]), 3)
+        assert len(arrays["vertex_values"]) == len(arrays["vertices"])
+        assert (arrays["sd"] > 0).all()
+
+
+@pytest.mark.slow
+def test_a_true_part_gets_the_rigid_program_whatever_was_asked_for(folder):
+    plan = load_plan(folder)
+    truth = Truth(OFFSET)
+    taken = scan(folder, "alignment", truth, true_shape(plan.surface, truth), "true.csv", 7)
+    done = {w: run_align(folder, [taken], AlignOptions(non_rigid=w), quiet) for w in (False, True)}
+    assert done[True].correction["non_rigid"]["applied"] is False
+    assert done[True].correction["non_rigid"]["reason"]
+    assert done[False].correction["non_rigid"] is None
+    assert done[True].correction["correction"] == done[False].correction["correction"]
+    programs = [{k: v for k, v in d.artifacts.items() if k.endswith((".src", ".dat"))} for d in done.values()]
+    assert programs[0]
+    assert programs[0] == programs[1]
