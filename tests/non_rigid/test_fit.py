@@ -51,7 +51,9 @@ def test_the_claimed_deviation_is_that_of_the_truth(shape):
 def test_nothing_to_adapt_is_never_worse_than_rigid():
     followed = 0
     for seed in range(20):
-        fit, rigid, curved = measured(CYLINDER, cases.nothing, seed=seed, correlation_mm=(10.0, 30.0)[seed % 2])
+        fit, rigid, curved = measured(
+            CYLINDER, cases.nothing, seed=seed, correlation_mm=(10.0, 30.0, 150.0)[seed % 3], spacing_mm=6.0
+        )
         before = spread(inspect(CYLINDER, cases.nothing, curved, rigid))[0]
         after = spread(inspect(CYLINDER, cases.nothing, curved, fit.T_base_part, fit.field))[0]
         followed += fit.field is not None
