@@ -61,11 +61,16 @@ class Kernel:
 
     @cached_property
     def _pair(self) -> tuple[Array, Array, Array | None]:
-        """Pairs of surface rows, products of their places on the array, and pairs of edge rows: (n, n) each."""
+        """How an error of the pose is shared, (n, n) each: by surface rows, by their places on the array, by edge rows.
+
+        The pose errs in space: two rows share it as far as they measure along the same direction. Opposite edges see it
+        with opposite signs, which is a shift of the part, not a bias.
+        """
+        along = self.rows.direction_base @ self.rows.direction_base.T
         surface = (~self.rows.edge).astype(np.float64)
         across = np.where(self.rows.edge, 0.0, self.rows.across)
-        both = np.outer(self.rows.edge, self.rows.edge).astype(np.float64) if self.rows.edge.any() else None
-        return np.outer(surface, surface), np.outer(across, across), both
+        both = along * np.outer(self.rows.edge, self.rows.edge) if self.rows.edge.any() else None
+        return along * np.outer(surface, surface), np.outer(across, across), both
 
     @cached_property
     def active(self) -> tuple[int, ...]:

@@ -20,6 +20,7 @@ class NoiseRows:
     count (n,): readings a row stands for. block (n,): row of `block_*` it lies on; -1 without a path. across (n,): its
     place on the array, -1..1. position_base (n, 3), mm; size_mm: extent of a cell. block_from_mm, block_to_mm, block_pass
     (b,): stretches of path, ascending. edge (n,): True for rows that measure an edge, whose noise is their own.
+    direction_base (n, 3): along which a row measures; an error of the pose shows in it by its component along.
     """
 
     r: Array
@@ -33,6 +34,7 @@ class NoiseRows:
     block_to_mm: Array
     block_pass: NDArray[np.int32]
     edge: NDArray[np.bool_]
+    direction_base: Array
 
     def __len__(self) -> int:
         return len(self.r)
@@ -115,6 +117,7 @@ def noise_rows(patches: Patches, rows: Rows, used: NDArray[np.bool_], prior_sigm
         s_to,
         info[first, 2].astype(np.int32),
         np.zeros(n, dtype=bool),
+        mean(rows.normal_base[picked]),
     )
 
 
@@ -148,4 +151,5 @@ def _without_path(patches: Patches, rows: Rows, used: NDArray[np.bool_], prior_s
         none.copy(),
         np.zeros(0, dtype=np.int32),
         np.zeros(n, dtype=bool),
+        mean(rows.normal_base[picked]),
     )

@@ -142,6 +142,7 @@ def _joined(
         block_to_mm=np.r_[surface.block_to_mm, s_to],
         block_pass=np.r_[surface.block_pass, pass_id].astype(np.int32),
         edge=np.r_[surface.edge, np.ones(n, dtype=bool)],
+        direction_base=np.vstack([surface.direction_base, mean(found.jacobian[picked, 3:])]),
     )
 
 
