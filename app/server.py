@@ -18,6 +18,7 @@ from starlette.types import Scope
 
 from app.api import (
     archive_routes,
+    cell_routes,
     errors,
     inputs,
     job_routes,
@@ -86,6 +87,7 @@ def create_app(settings: ServerSettings) -> FastAPI:
         projects,
         part,
         inputs,
+        cell_routes,
         work,
         scan_routes,
         result_routes,

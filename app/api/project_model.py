@@ -86,6 +86,13 @@ class StoreModel:
         given = self._input("keypoints")
         return KeyPointSet(tuple(KeyPointList.validate_python(given.content)), given.version)
 
+    def keypoint_history(self, limit: int) -> list[tuple[KeyPoint, ...]]:
+        """Return the sets that were in force, oldest first, the present one last."""
+        with self._store.db.read() as session:
+            rows = inputs.recent(session, self._id, "keypoints", limit)
+        sets = [tuple(KeyPointList.validate_python(row.content)) for row in rows]
+        return sets if len(sets) == limit else [(), *sets]
+
     def set_keypoints(self, points: tuple[KeyPoint, ...], version: int | None, who: str) -> int:
         """Replace the key points if `version` is still theirs; return the new version."""
         content = KeyPointList.dump_python(list(points), mode="json")

@@ -127,6 +127,14 @@ def get_assessment(ctx: Ctx, project_id: ProjectId, number: Number) -> dict[str,
         return {**_json(ctx, session, row, "assessment.json"), **_state(session, row)}
 
 
+@router.get("/assessments/{number}/charts", responses=documented(404))
+def get_charts(ctx: Ctx, project_id: ProjectId, number: Number) -> dict[str, Any]:
+    """Return the maps and histograms of an assessment (`charts.json`), after and before on common scales."""
+    with ctx.store.db.read() as session:
+        projects.get(session, project_id)
+        return _json(ctx, session, results.get_result(session, project_id, "assessment", number), "charts.json")
+
+
 @router.get("/{kind}s/{number}/files", responses=documented(404) | ZIP, response_class=Response, include_in_schema=True)
 def get_files(ctx: Ctx, project_id: ProjectId, kind: Literal["alignment", "assessment"], number: Number) -> Response:
     """Download the documents of a result as ZIP: reports, JSON, tables, maps. Programs have their own address."""

@@ -1,5 +1,7 @@
 """A sample part and its cell, in one click."""
 
+import hashlib
+from functools import cache
 from typing import Any
 
 from fastapi import APIRouter
@@ -24,9 +26,17 @@ class SampleChoice(Body):
 
 @router.get("/samples", responses=documented())
 def list_samples() -> list[dict[str, Any]]:
-    """Return the sample parts, each with an offset to hide it at for a rehearsal (X Y Z mm, A B C deg)."""
+    """Return the sample parts: SHA-256 of the CAD file, and an offset to hide it at for a rehearsal (mm, deg)."""
     keys = ("x_mm", "y_mm", "z_mm", "a_deg", "b_deg", "c_deg")
-    return [{"name": n, "hidden_offset": dict(zip(keys, sample(n).hidden_offset, strict=True))} for n in NAMES]
+    return [
+        {"name": n, "sha256": _sha256(n), "hidden_offset": dict(zip(keys, sample(n).hidden_offset, strict=True))}
+        for n in NAMES
+    ]
+
+
+@cache
+def _sha256(name: str) -> str:
+    return hashlib.sha256(sample(name).source.read_bytes()).hexdigest()
 
 
 @router.post("/projects/{project_id}/sample", responses=documented(404))

@@ -67,8 +67,10 @@ def assess_spec(session: Session, pid: str, number: int | None, before: int | No
     earlier = [scans.get_scan(session, pid, before)] if before else []
     files, scan_files = _scan_files(session, [after], "scans")
     more, before_files = _scan_files(session, earlier, "before")
+    setup = inputs.setup_in(session, pid)
     options = {
         "scan_files": scan_files, "before_files": before_files, "scan": after.number, "before": before,
+        "standoff_mm": setup.standoff_mm, "loss_db": setup.tolerances.loss_db,
     }  # fmt: skip
     made_from = {"plan": plan.sha256, "scans": [s.sha256 for s in (after, *earlier)], "version": VERSION}
     more |= _correction(session, pid, plan)

@@ -66,10 +66,14 @@ def _align(workflow: str, inputs: Path, outputs: Path, options: dict[str, Any], 
 
 
 def _assess(workflow: str, inputs: Path, outputs: Path, options: dict[str, Any], progress: Progress) -> dict[str, Any]:
+    from app.view.assessment_charts import assessment_charts  # noqa: PLC0415 - other tasks do without
+
     after = [inputs / name for name in options["scan_files"]]
     before = [inputs / name for name in options["before_files"]]
     done = import_module(workflow).assess(inputs, after[0], before[0] if before else None, progress)
-    write_artifacts(outputs, done.artifacts)
+    charts = assessment_charts(done.after, done.before, options["standoff_mm"], options["loss_db"])
+    text = json.dumps(charts, allow_nan=False)
+    write_artifacts(outputs, {**done.artifacts, "charts.json": text.encode()})
     return {"summary": done.content | {"issues": [issue.to_json() for issue in done.issues]}}
 
 

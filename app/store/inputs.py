@@ -62,6 +62,13 @@ def version_of(session: Session, project_id: str, kind: str, version: int) -> In
     return Input(kind, row.version, row.sha256, json.loads(row.content))
 
 
+def recent(session: Session, project_id: str, kind: str, limit: int) -> list[Input]:
+    """Return the last versions of an input, oldest first."""
+    newest = select(InputRow).where(InputRow.project_id == project_id, InputRow.kind == kind)
+    rows = list(session.scalars(newest.order_by(InputRow.version.desc()).limit(limit)))
+    return [Input(kind, row.version, row.sha256, json.loads(row.content)) for row in reversed(rows)]
+
+
 def put(store: Store, project_id: str, kind: str, content: Any, expected: int | None = None, who: str = "") -> Input:
     """Put a new content in force; the same content again changes nothing. Raises Refusal 404, 412."""
     with store.db.write() as session:

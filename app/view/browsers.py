@@ -34,10 +34,10 @@ class Browser:
             if self.probe_pose is not None:
                 place_for(self.client, f"{LAYERS['probe'].node}/tcp", *self.probe_pose)
 
-    def turn_to(self, step: str) -> None:
-        """Show the layers of a step."""
+    def turn_to(self, step: str, found: bool) -> None:
+        """Show the layers of a step; `found`: whether an alignment has found the part."""
         self.step = step
-        self.shown = set(layers_of(step))
+        self.shown = set(layers_of(step, found))
 
 
 class Browsers:

@@ -109,6 +109,23 @@ def draw_part(
     lines(server, f"{node}/edges", shape.edges, edges_rgb, 1.4)
 
 
+def draw_ghost(server: viser.ViserServer, shape: Shape, sheet: Sheet | None) -> None:
+    """Draw the inspection surface as if of glass, with the feature edges of the part."""
+    node = LAYERS["ghost"].node
+    lines(server, f"{node}/edges", shape.edges, colour.EDGE, 1.4)
+    if sheet is not None:
+        server.scene.add_mesh_simple(
+            f"{node}/sheet",
+            (sheet.vertices * M).astype(np.float32),
+            sheet.faces.astype(np.uint32),
+            color=colour.STEEL,
+            opacity=0.25,
+            side="double",
+            cast_shadow=False,
+            receive_shadow=False,
+        )
+
+
 def draw_axes(server: viser.ViserServer, size_mm: float) -> None:
     """Draw the triads of base and of the CAD origin."""
     length = size_mm * M * 0.12

@@ -1,17 +1,24 @@
 """Undo and redo of key points: every set that was in force, whoever made it."""
 
+from collections.abc import Iterable
+
 from planner.keypoint import KeyPoint
 
 Points = tuple[KeyPoint, ...]
+LIMIT = 200
 
 
 class History:
     """A line of key-point sets with a place on it; an edit after an undo forgets what was undone."""
 
-    def __init__(self, first: Points, limit: int = 200) -> None:
+    def __init__(self, sets: Iterable[Points], limit: int = LIMIT) -> None:
+        """sets: what was in force so far, oldest first, the present one last; at least one."""
+        first, *later = sets
         self._sets: list[Points] = [first]
         self._at = 0
         self._limit = limit
+        for points in later:
+            self.note(points)
 
     @property
     def undos(self) -> int:

@@ -14,6 +14,7 @@ class Layer:
 LAYERS: dict[str, Layer] = {
     "axes": Layer("/base/axes", "Frames"),
     "cad": Layer("/base/partnom/cad", "Part (CAD)"),
+    "ghost": Layer("/base/partnom/ghost", "Part, transparent"),
     "surface": Layer("/base/partnom/surface", "Inspection surface"),
     "coverage": Layer("/base/partnom/coverage", "Coverage of the alignment scan"),
     "keypoints": Layer("/base/partnom/keypoints", "Key points"),
@@ -34,14 +35,19 @@ STEPS: dict[str, tuple[str, ...]] = {
     "keypoints": ("cad", "surface", "coverage", "keypoints"),
     "paths": ("cad", "inspection", "probe"),
     "programs": ("cad", "alignment", "keypoints"),
-    "scan": ("cad", "keypoints", "scan"),
+    # The part stands somewhere else than the CAD: its points may lie inside.
+    "scan": ("ghost", "keypoints", "scan"),
     "alignment": ("found", "after", "keypoints"),
     "report": ("found", "after"),
 }
+UNFOUND = ("ghost", "keypoints", "scan")
+"""What a step about the found part shows while there is none."""
 
 FRAMES = ("/base", "/base/partnom", "/base/part")
 
 
-def layers_of(step: str) -> frozenset[str]:
-    """Return the layers a step shows."""
+def layers_of(step: str, found: bool = True) -> frozenset[str]:
+    """Return the layers a step shows; `found`: whether an alignment has found the part."""
+    if not found and "found" in STEPS.get(step, ()):
+        return frozenset(UNFOUND)
     return frozenset(STEPS.get(step, STEPS["part"]))

@@ -96,6 +96,10 @@ class ProjectModel(Protocol):
         """Return the key points and their version."""
         ...
 
+    def keypoint_history(self, limit: int) -> list[tuple[KeyPoint, ...]]:
+        """Return up to `limit` sets that were in force (and the empty one before all), oldest first, the present last."""
+        ...
+
     def set_keypoints(self, points: tuple[KeyPoint, ...], version: int | None, who: str) -> int:
         """Replace the key points if `version` is still theirs (None: whatever it is); return the new version.
 

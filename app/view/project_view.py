@@ -14,14 +14,15 @@ from app.view.clicks import Clicks
 from app.view.commands import ViewCommand, ViewState
 from app.view.draw_part import FOV_RAD
 from app.view.edits import without
-from app.view.history import History, Points
+from app.view.history import LIMIT, History, Points
 from app.view.layers import LAYERS
 from app.view.loopback import start_loopback, user_of
-from app.view.model import ProjectModel, Topic
+from app.view.model import Insight, ProjectModel, Topic
 from app.view.probe_at import probe_facts, probe_index
 from app.view.stage import Stage
 from app.view.summary import insight_json
 from app.view.worker import Worker
+from planner.errors import EchoBaseError
 from planner.issues import Issue
 from planner.placement import assume_nominal
 
@@ -39,7 +40,7 @@ class ProjectView:
         self.server = start_loopback(key)
         self.browsers = Browsers()
         self.stage = Stage(self.server, model)
-        self.history = History(model.keypoints().points)
+        self.history = History(model.keypoint_history(LIMIT))
         self.last_used = time.monotonic()
         self.draw = Worker(f"view-{model.project_id}", self._issue)
         self._think = Worker(f"insight-{model.project_id}", self._issue)
@@ -138,10 +139,7 @@ class ProjectView:
 
     def _arrange(self, browser: Browser, command: ViewCommand) -> None:
         if command.step is not None:
-            browser.turn_to(command.step)
-            if command.step in {"alignment", "report"} and self.stage.found is None:
-                # Nothing was found (yet): what there is to see is the part and the scan.
-                browser.shown = {"cad", "keypoints", "scan"}
+            browser.turn_to(command.step, self.stage.found is not None)
         for name, on in (command.layers or {}).items():
             if name in LAYERS:
                 (browser.shown.add if on else browser.shown.discard)(name)
@@ -268,6 +266,8 @@ class ProjectView:
             self.draw.put(task, task.__name__)
         if topic == "part":
             self.draw.put(self._frame_all, "frame")
+        if topic == "alignment":
+            self.draw.put(self._show_found, "found")
         if topic in {"part", "surface", "setup", "keypoints"}:
             self._think.put(self._look_into, "insight")
         self.draw.put(lambda: self.model.publish("view", {"topic": topic}), f"told-{topic}")
@@ -280,8 +280,19 @@ class ProjectView:
             if not browser.moved:
                 self._look(browser, "iso")
 
+    def _show_found(self) -> None:
+        """Turn those who look at the alignment to what it found, or away from what no longer holds."""
+        for browser in self.browsers.chosen(None):
+            if browser.step in {"alignment", "report"}:
+                browser.turn_to(browser.step, self.stage.found is not None)
+                browser.apply()
+                browser.client.flush()
+
     def _look_into(self) -> None:
-        insight = self.model.insight()
+        try:
+            insight = self.model.insight()
+        except EchoBaseError as error:
+            insight = Insight(self.model.keypoints().version, error.issues)
         self.stage.insight = insight
         self.draw.put(self.stage.keypoints, "keypoints")
         self.draw.put(self.stage.coverage, "coverage")

@@ -23,7 +23,8 @@ CLIENT_HTML = Path(viser.__file__).parent / "client" / "build" / "index.html"
 # Its sorter of Gaussian splats, which EchoBase never shows, evaluates text and fails under the policy: not an error to report.
 SHIM = """<script>document.hasFocus = () => !document.hidden;
 addEventListener("unhandledrejection", (e) => { if (e.reason instanceof EvalError) e.preventDefault(); });</script>
-<style>[data-testid="floating-panel"], .mantine-Paper-root[style*="position: fixed"][style*="bottom: 0"]
+<style>[data-testid="floating-panel"], .mantine-Notifications-root,
+.mantine-Paper-root[style*="position: fixed"][style*="bottom: 0"]
 { display: none !important; }</style>
 """
 NOT_FOUND, BAD_UPSTREAM = 4404, 4502

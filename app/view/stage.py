@@ -8,7 +8,18 @@ import viser
 from app.view import colour
 from app.view.deviation import deviation, symmetric_limit
 from app.view.draw_keypoints import draw_keypoints, marks
-from app.view.draw_part import Shape, Sheet, draw_axes, draw_part, draw_surface, place, prepare, shape_of, sheet_of
+from app.view.draw_part import (
+    Shape,
+    Sheet,
+    draw_axes,
+    draw_ghost,
+    draw_part,
+    draw_surface,
+    place,
+    prepare,
+    shape_of,
+    sheet_of,
+)
 from app.view.draw_paths import draw_coverage, draw_path, draw_probe
 from app.view.draw_scan import Legend, draw_deviation, draw_scan
 from app.view.layers import LAYERS
@@ -58,6 +69,7 @@ class Stage:
         self.picker = None
         for name in ("cad", "found"):
             self._clear(name, "body", "edges")
+        self._clear("ghost", "edges", "sheet")
         self.shape = None
         if part is None:
             return
@@ -84,11 +96,14 @@ class Stage:
             return
         self._surface = surface
         self.sheet = sheet_of(surface) if surface is not None else None
+        if self.shape is not None:
+            draw_ghost(self.server, self.shape, self.sheet)
         if self.sheet is not None:
             draw_surface(self.server, self.sheet)
         else:
             self._clear("surface", "tint", "outline")
             self._clear("coverage", "swept")
+            self._clear("ghost", "sheet")
         if self.picker is not None:
             self.picker.use(surface)
 

@@ -34,19 +34,19 @@ export function askAcceptance(reasons) {
     "Accept", (f) => { remember(f.elements.who.value); return { name: f.elements.who.value.trim(), reason: f.elements.reason.value.trim() }; });
 }
 
-/** Ask for the hidden truth of a rehearsal. */
-export function askRehearsal(path, draw, known) {
+/** Ask for the hidden truth of a rehearsal. `draw()` makes one; `own` is the sample's, `last` where the part was hidden before. */
+export function askRehearsal(path, draw, { own = null, last = null } = {}) {
   const inputs = {};
   const six = h("div", { class: "six" }, AXES.map((axis) => {
     inputs[axis] = h("input", { type: "number", name: axis, step: "any", value: "0", required: true });
     return h("label", {}, `${axis.toUpperCase()} (${isAngle(axis) ? "deg" : "mm"})`, inputs[axis]);
   }));
   const shuffle = (offset = draw()) => { for (const axis of AXES) inputs[axis].value = String(offset[axis]); };
-  shuffle(known ?? draw());
+  shuffle(last ?? own ?? draw());
   const hide = h("input", { type: "checkbox", name: "hide", onchange: () => six.classList.toggle("hidden", hide.checked) });
   const number = (name, text, value, props) => labelled(text, h("input", { type: "number", name, value, step: "any", ...props }));
   return ask("Rehearse with the simulated scanner", `The ${path} program runs on a simulated robot. The part stands away from where the program believes it is; the alignment has to find out by how much.`,
-    [six, h("div", { class: "row" }, button("Draw another", () => shuffle()), h("label", { class: "row tight" }, hide, "Do not show me")),
+    [six, h("div", { class: "row" }, last && button("As scanned", () => shuffle(last), { title: "Where the part stood in the last alignment scan" }), own && button("The sample's", () => shuffle(own), { title: "The offset that belongs to this sample" }), button("Random", () => shuffle(), { title: "Drawn from the fixture's tolerance in the cell" }), h("label", { class: "row tight" }, hide, "Do not show me")),
       h("div", { class: "six" }, number("spring", "Spring back (mm)", "0", { min: -100, max: 100 }), number("outliers", "Outliers (%)", "0", { min: 0, max: 90 }), number("dropouts", "Dropouts (%)", "0", { min: 0, max: 90 }))],
     "Run", (f) => ({
       path,

@@ -34,6 +34,10 @@ export class Drawer {
       h("span", { style: { flex: "1" } }), tab && h("button", { type: "button", class: "tab", onclick: () => { this.open = !this.open; this.draw(); } }, this.open ? "Hide" : "Show"));
     if (!shown) return;
     const token = (this.token = {});
+    const place = `${this.step} ${tab.key}`;
+    // Another step's chart under this tab's name would be a lie, however short.
+    if (place !== this.place) fill(this.body, h("p", { class: "nothing" }, "Loading…"));
+    this.place = place;
     Promise.resolve(tab.draw(this.body, () => this.token === token)).catch((error) => {
       if (this.token === token) fill(this.body, h("p", { class: "nothing" }, error.message || "This cannot be shown."));
     });

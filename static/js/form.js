@@ -63,8 +63,12 @@ export function field({ key, path, schema, label }, value, saved, change) {
 function inputFor(schema, value, id, name, bounds, change) {
   const common = { id, name, title: bounds };
   if (schema.type === "boolean") return h("input", { ...common, type: "checkbox", checked: Boolean(value), onchange: (e) => change(e.target.checked) });
-  const options = schema.enum ?? (schema.const !== undefined ? [schema.const] : null);
-  if (options) return h("select", { ...common, onchange: (e) => change(e.target.value) }, options.map((o) => h("option", { value: o, selected: o === value }, o)));
+  const options = schema.choices ?? (schema.enum ?? (schema.const !== undefined ? [schema.const] : null))?.map((o) => [o, o]);
+  if (options) {
+    // What is in force stays to be seen, even if the server no longer offers it.
+    const known = value === undefined || value === null || options.some(([o]) => o === value);
+    return h("select", { ...common, onchange: (e) => change(e.target.value) }, [...options, ...(known ? [] : [[value, `${value} (unknown)`]])].map(([o, text]) => h("option", { value: o, selected: o === value }, text)));
+  }
   if (schema.type === "array") {
     return h("input", { ...common, type: "text", value: (value ?? []).join(" "), placeholder: "none", onchange: (e) => change(e.target.value.split(/[\s,]+/).filter(Boolean)) });
   }

@@ -12,7 +12,8 @@ export function journey(data) {
   const { part, setup, surface, keypoints, plan, scans, alignment, assessment, insight } = data;
   const errors = (list) => (list ?? []).filter((i) => i.severity === "error").length;
   const taught = setup && ["x_mm", "y_mm", "z_mm", "a_deg", "b_deg", "c_deg"].some((k) => setup.base[k] !== 0);
-  const bad = insight?.issues ? errors(insight.issues) : 0;
+  const fresh = insight && insight.version === data.state?.versions?.keypoints ? insight : null;
+  const bad = errors(fresh?.issues);
   const programs = plan?.programs ?? {};
   const free = Object.values(programs).filter((p) => p.available).length;
   const stale = (result, state) => (result.stale ? { ...state, tone: "warn", word: "out of date" } : state);
@@ -20,7 +21,7 @@ export function journey(data) {
     part: part ? done(sizes(part.extents_mm)) : { ...TODO, word: "start here", fact: "Load the CAD of the part" },
     cell: !setup ? TODO : done(`${setup.robot}, ${setup.probe.elements === 1 ? "single crystal" : `${setup.probe.elements} elements`}`, taught ? "BASE taught" : "BASE untaught"),
     surface: !part ? TODO : done(plan && !plan.stale ? `${whole(plan.surface.area_mm2 / 100)} cm²` : surface?.seeds?.length ? "chosen" : "the largest face", surface?.seeds?.length ? "chosen" : "by default"),
-    keypoints: keyPoints(keypoints, insight, bad, part),
+    keypoints: keyPoints(keypoints, fresh, bad, part),
     paths: !plan ? TODO : stale(plan, { tone: errors(plan.issues) ? "bad" : "good", word: errors(plan.issues) ? `${errors(plan.issues)} to solve` : "planned", fact: `${whole(plan.inspection?.passes)} passes, ${pct(share(plan.inspection), 1)} swept` }),
     programs: !plan ? TODO : stale(plan, { tone: free === 2 ? "good" : "bad", word: free === 2 ? "proven" : "withheld", fact: `${free} of 2 programs ready` }),
     scan: !scans?.length ? TODO : done(`${scans.length} ${scans.length === 1 ? "scan" : "scans"}`, scans.at(-1).origin === "simulated" ? "rehearsed" : "uploaded"),
@@ -51,7 +52,8 @@ function keyPoints(keypoints, insight, bad, part) {
   const n = keypoints?.length ?? 0;
   if (!n) return { tone: "todo", word: "", fact: "none: EchoBase will choose" };
   const coverage = insight?.coverage ?? null;
-  const fact = `${n}, ${coverage === null ? "coverage unknown yet" : `${pct(coverage)} covered`}`;
+  if (coverage === null && !bad) return { tone: "busy", word: "computing", fact: `${n}, coverage is being computed` };
+  const fact = `${n}, ${coverage === null ? "coverage unknown" : `${pct(coverage)} covered`}`;
   return bad ? { tone: "bad", word: `${bad} unusable`, fact } : done(fact, "picked");
 }
 

@@ -68,8 +68,14 @@ export class Project {
     clearTimeout(this.timer);
     return new Promise((resolve) => {
       this.loaded = [...(this.loaded ?? []), resolve];
-      this.timer = setTimeout(() => this.fetchPending(), 30);
+      this.timer = setTimeout(() => this.fetchInTurn(), 30);
     });
+  }
+
+  // One after the other: an older answer that comes late must not cover a newer one.
+  fetchInTurn() {
+    this.turn = (this.turn ?? Promise.resolve()).then(() => this.fetchPending());
+    return this.turn;
   }
 
   async fetchPending() {
@@ -97,6 +103,7 @@ export class Project {
       const answer = await get(`${this.path}${PATHS[name]}`);
       // Of results the newest counts.
       this.data[name] = NEWEST.has(name) ? (answer.at(-1) ?? null) : answer;
+      if (NEWEST.has(name)) this.data[`${name}s`] = answer;
     } catch (error) {
       if (error instanceof ApiError && [404, 409].includes(error.status)) this.data[name] = null;
       if (["project", "state"].includes(name) && error.status === 404) this.deleted = true;

@@ -47,3 +47,9 @@ function count(issues) {
 
 /** The tone of a verdict of a result. */
 export const toneOf = (word) => ({ pass: "good", partial: "warn", fail: "bad", measured: "good", weak: "warn", held: "none", matched: "good", rejected: "bad", unmatched: "bad" })[word] ?? "none";
+
+/** What runs now, in place of a verdict: the line the job says, and how far it is. */
+export function working(shell, word, ...kinds) {
+  const job = [...shell.project.data.jobs.values()].find((j) => kinds.includes(j.kind) && ["queued", "running"].includes(j.state));
+  return h("div", { class: "verdict busy", role: "status" }, h("span", { class: "sign", "aria-hidden": "true" }, sign("busy")), h("div", {}, h("b", {}, word), h("p", { class: "small" }, job?.text ? sentence(job.text) : "Waiting for its turn"), h("progress", { value: job?.fraction ?? 0, max: 1, "aria-label": word })));
+}

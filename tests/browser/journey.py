@@ -4,6 +4,8 @@ import re
 
 from playwright.sync_api import Page
 
+from tests.browser.eyes import until
+
 SLOW = 180_000
 
 
@@ -20,13 +22,15 @@ def open_sample(page: Page, url: str, button: str) -> None:
     page.locator(".top .part").wait_for(timeout=SLOW)
 
 
+MET = (
+    "() => Boolean(document.querySelector('iframe')?.contentDocument?.querySelector('[data-testid=\"floating-panel\"]')"
+    "?.textContent.includes('echobase-view-'))"
+)
+
+
 def seen(page: Page) -> None:
     """Wait until the 3D view has met the server."""
-    page.wait_for_function(
-        "document.querySelector('iframe')?.contentDocument?.querySelector('[data-testid=\"floating-panel\"]')"
-        "?.textContent.includes('echobase-view-')",
-        timeout=SLOW,
-    )
+    until(page, lambda: page.evaluate(MET), SLOW / 1000, "the meeting of view and server")
 
 
 def chosen(page: Page) -> None:
@@ -43,7 +47,7 @@ def suggest(page: Page) -> None:
 def plan(page: Page) -> None:
     step(page, "Paths")
     page.get_by_role("button", name="Plan both paths").click()
-    page.locator(".inspector .verdict", has_text="Planned").wait_for(timeout=SLOW)
+    page.locator(".inspector .verdict", has_text="Both paths keep to the tolerances").wait_for(timeout=SLOW)
 
 
 def rehearse(page: Page, offset: dict[str, str]) -> None:

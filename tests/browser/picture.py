@@ -31,11 +31,6 @@ def main() -> None:
             for step, name in STEPS.items():
                 journey.step(page, step)
                 page.wait_for_timeout(12_000)
-                # The warning about software rendering belongs to machines without a graphics card.
-                page.frame_locator("iframe").locator(".mantine-Notifications-root").evaluate_all(
-                    "n => n.forEach(e => e.remove())"
-                )
-                page.wait_for_timeout(1_000)
                 page.screenshot(path=ROOT / "docs" / "img" / f"{name}.png")
             browser.close()
     finally:

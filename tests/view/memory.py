@@ -129,6 +129,9 @@ class MemoryModel:
     def keypoints(self) -> KeyPointSet:
         return self._keys
 
+    def keypoint_history(self, limit: int) -> list[tuple[KeyPoint, ...]]:
+        return [(), self._keys.points][-limit:]
+
     def set_keypoints(self, points: tuple[KeyPoint, ...], version: int | None, who: str) -> int:
         with self._lock:
             if version is not None and version != self._keys.version:

@@ -44,7 +44,7 @@ def test_a_second_click_on_the_same_place_is_found():
     )
 )
 def test_history_is_a_line_that_can_be_walked(actions):
-    history, line, at = History(()), [()], 0
+    history, line, at = History([()]), [()], 0
     for what, n in actions:
         if what == "edit":
             state = points(*(f"K{i}" for i in range(n)))

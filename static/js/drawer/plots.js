@@ -54,6 +54,16 @@ export function maps(body, alive, charts) {
   })));
 }
 
+/** Maps over the part of one quantity, on one scale, in the colours of the 3D view. */
+export function surfaceMaps(body, alive, charts, unit) {
+  const scale = charts.colours.map((c, i) => [i / (charts.colours.length - 1), c]);
+  const list = charts.maps.filter((m) => m.unit === unit);
+  return draw(body, alive, list.map((m) => ({
+    traces: [{ type: "heatmap", z: m.z, x0: m.x0, dx: m.cell_mm, y0: m.y0, dy: m.cell_mm, zmin: -m.limit, zmax: m.limit, colorscale: scale, colorbar: { title: { text: m.unit, font: { size: 11 } }, thickness: 10, outlinewidth: 0 }, hovertemplate: `%{x:.1f}, %{y:.1f} mm: %{z:.3f} ${m.unit}<extra></extra>` }],
+    layout: layout(`${m.title}, ${TITLES[m.series] ?? m.series}`, axis(m.x_title), axis(m.y_title, { scaleanchor: "x" })),
+  })));
+}
+
 /** The front wall of one law along the scan. */
 export function profile(body, alive, c) {
   return draw(body, alive, [{

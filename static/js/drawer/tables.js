@@ -1,7 +1,7 @@
 // Tables: key points, directions of the alignment, issues of a plan.
 
 import { fill, h } from "../dom.js";
-import { deg, fixed, mm, whole } from "../format.js";
+import { AXES, deg, fixed, isAngle, mm, ofAxis, poseKey, whole } from "../format.js";
 import { tag, toneOf } from "../status.js";
 
 /** A table: columns [{title, cell(row), text}] over rows; rows can be picked. */
@@ -61,4 +61,16 @@ export function planned(body, keypoints, insight, focus, remove) {
     { title: "Why", text: true, cell: (k) => worst(k.id)?.message ?? "" },
     { title: "", cell: (k) => h("button", { type: "button", class: "btn ghost tiny", "aria-label": `Delete ${k.id}`, onclick: () => remove(k.id) }, "✕") },
   ], keypoints));
+}
+
+/** Every alignment of the project, the newest first. `report(number)` is the address of its report. */
+export function runs(body, list, report) {
+  return fill(body, table([
+    { title: "Alignment", text: true, cell: (a) => h("a", { href: report(a.number), target: "_blank", rel: "noopener" }, `#${a.number}`) },
+    { title: "", text: true, cell: (a) => (a.stale ? tag("warn", "out of date") : tag(toneOf(a.verdict), a.accepted ? `${a.verdict}, accepted` : a.verdict)) },
+    { title: "Method", text: true, cell: (a) => (a.method === "map" ? (a.options?.non_rigid ? "MAP, non-rigid" : "MAP") : "key points") },
+    ...AXES.map((axis) => ({ title: `${axis.toUpperCase()}, ${isAngle(axis) ? "deg" : "mm"}`, cell: (a) => ofAxis(axis, a.correction?.[poseKey(axis)]) })),
+    { title: "Residual rms, mm", cell: (a) => mm(a.residual?.rms_mm) },
+    { title: "Made", text: true, cell: (a) => a.created.slice(0, 16).replace("T", " ") },
+  ], [...list].reverse()));
 }

@@ -1,13 +1,13 @@
 // Step 8: where the part is: the correction, how well it is known, and what it changes.
 
-import { get, post } from "../api.js";
+import { API, get, post } from "../api.js";
 import { askAcceptance } from "../dialog.js";
 import { button, h } from "../dom.js";
 import { histograms } from "../drawer/plots.js";
-import { directions, matches } from "../drawer/tables.js";
+import { directions, matches, runs } from "../drawer/tables.js";
 import { AXES, facts, fixed, isAngle, mm, ofAxis, pct, poseKey, whole } from "../format.js";
 import { signed } from "../journey.js";
-import { issueList, tag, toneOf, verdict } from "../status.js";
+import { issueList, tag, toneOf, verdict, working } from "../status.js";
 
 export const watchesView = true;
 export const watchesJobs = true;
@@ -16,14 +16,19 @@ const WORDS = { pass: ["Pass", "The part is found; the corrected program may run
 export function content(shell) {
   const { alignment: a, scans, setup } = shell.project.data;
   const local = (shell.local.alignment ??= { method: "map", edges: "", non_rigid: false, layer: "after" });
+  if (shell.busy("alignment")) return working(shell, "Aligning", "alignment");
   if (!a) return [verdict("none", "Not aligned yet", scans?.length ? "The alignment finds the part from the readings." : "Upload a scan, or rehearse one, first."), options(shell, local)];
+  const { layers: on, legend } = shell.view.state ?? {};
+  shell.view.say(a.verdict !== "fail" && !a.stale && on?.after && !legend ? "Drawing the deviation map…" : null);
   const [word, text] = WORDS[a.verdict] ?? [a.verdict, ""];
   return [
     a.stale ? verdict("warn", "Out of date", `Changed since: ${a.stale_because.join(", ")}.`) : a.accepted ? verdict("good", "Accepted", `By ${a.accepted.name}: ${a.accepted.reason}`) : verdict(toneOf(a.verdict), word, text),
     a.verdict !== "pass" && issueList(a.issues, 8),
     correction(a, setup, hidden(shell)),
-    layers(shell, local),
+    paper(a, hidden(shell)),
+    a.verdict !== "fail" && !a.stale && layers(shell, local),
     before(a),
+    sprang(a.non_rigid),
     facts([["Residual, rms", mm(a.residual?.rms_mm), "mm"], ["Residual, 95 %", mm(a.residual?.p95_mm), "mm"], ["Readings used", whole(a.residual?.readings)], ["Method", h("span", {}, a.method === "map" ? "MAP, all readings" : "key points (paper)")]]),
     a.verdict === "pass" && issueList(a.issues, 8),
     options(shell, local),
@@ -50,6 +55,28 @@ function correction(a, setup, truth) {
     h("div", {}, h("h3", {}, "Correction of BASE, one sigma"), h("table", { class: "correction" }, truth && h("thead", {}, h("tr", {}, ["", "found", "", "", "hidden"].map((t) => h("th", {}, t)))), h("tbody", {}, rows))),
     h("div", {}, h("h3", {}, `BASE_DATA[${a.base.number}]`), h("table", {}, h("thead", {}, h("tr", {}, ["", "nominal", "corrected"].map((t) => h("th", {}, t)))), h("tbody", {}, bases))),
   ];
+}
+
+/** The paper's key-point method on the same readings; with a rehearsal's truth, how far each is off. */
+function paper(a, truth) {
+  const b = a.baseline;
+  if (a.method !== "map") return null;
+  if (!b) return h("p", { class: "soft small" }, "The key-point method of the paper finds no answer in these readings.");
+  const cells = (axis) => {
+    const key = poseKey(axis);
+    const places = isAngle(axis) ? 4 : 3;
+    const rest = truth ? [b[key] - truth[key], a.correction[key] - truth[key]] : [b[key] - a.correction[key]];
+    return [b[key], ...rest].map((v, i) => h("td", { class: `num ${i ? "" : "soft"}` }, signed(v, places)));
+  };
+  const titles = ["", "its answer", ...(truth ? ["its error", "ours"] : ["less ours"])];
+  return h("div", {}, h("h3", {}, "Beside it: the paper's key-point method"), h("table", {}, h("thead", {}, h("tr", {}, titles.map((t) => h("th", {}, t)))), h("tbody", {}, AXES.map((axis) => h("tr", {}, h("td", {}, `${axis.toUpperCase()} `, h("span", { class: "unit" }, isAngle(axis) ? "deg" : "mm")), cells(axis))))));
+}
+
+/** What was found of a part that sprang back. */
+function sprang(n) {
+  if (!n) return null;
+  return h("div", { class: "stack" }, h("h3", {}, "Shape of the part"), h("p", { class: "small" }, n.applied ? "The poses follow the measured shape." : n.reason ?? "Rigid."),
+    facts([["Field, rms", mm(n.field_rms_mm), "mm"], ["Field, largest", mm(n.field_max_mm), "mm"], ["Largest slope", fixed(n.slope_max_deg, 3), "deg"], ["Known over", pct(n.support_share)]]));
 }
 
 function layers(shell, local) {
@@ -95,11 +122,12 @@ export async function accept(shell, a) {
 }
 
 export function drawer(shell) {
-  const { alignment: a } = shell.project.data;
+  const { alignment: a, alignments: all = [] } = shell.project.data;
   if (!a) return { tabs: [], stamp: "" };
-  return { stamp: `${a.number} ${a.stale}`, tabs: [
+  return { stamp: `${a.number} ${a.stale} ${all.length}`, tabs: [
     { key: "histogram", title: "Before and after", draw: async (body, alive) => histograms(body, alive, await get(`${shell.project.path}/charts/deviation`)) },
     { key: "points", title: "Key points", draw: (body) => matches(body, a.keypoints, (id) => shell.view.send({ focus: id })) },
     { key: "directions", title: "Directions", draw: (body) => directions(body, a.directions) },
+    ...(all.length > 1 ? [{ key: "runs", title: "All alignments", draw: (body) => runs(body, all, (n) => `${API}${shell.project.path}/alignments/${n}/report`) }] : []),
   ] };
 }

@@ -1,9 +1,10 @@
 // Step 2: the cell, as a form made from the schema of the setup.
 
-import { ApiError } from "../api.js";
+import { ApiError, get } from "../api.js";
 import { button, h } from "../dom.js";
+import { baseFit, newFit } from "../drawer/basefit.js";
 import { field, fieldsOf, at, title, withValue } from "../form.js";
-import { fixed } from "../format.js";
+import { AXES, fixed, poseKey } from "../format.js";
 
 let schemaPromise = null;
 
@@ -15,7 +16,7 @@ async function schema() {
       const root = await answer.json();
       const all = root.components?.schemas ?? {};
       const found = all["Setup-Input"] ?? all.Setup;
-      if (found) return { root, setup: found };
+      if (found) return { root, setup: found, robots: await get("/robots") };
     }
     schemaPromise = null;
     throw new ApiError(0, [{ severity: "error", code: "schema-missing", message: "The server does not describe the setup.", remedy: "Reload the page.", where: "openapi.json" }]);
@@ -35,14 +36,32 @@ export function content(shell) {
   }
   const draft = local.draft ?? setup;
   const change = (path, value) => { local.draft = withValue(local.draft ?? setup, path, value); if (JSON.stringify(local.draft) === JSON.stringify(setup)) local.draft = null; shell.draw(); };
-  const one = (f, label) => field({ ...f, label }, at(draft, f.path), at(setup, f.path), change);
+  const one = (f, label) => field({ ...f, label, schema: f.key === "robot" ? robotSchema(f.schema, local.schema.robots) : f.schema }, at(draft, f.path), at(setup, f.path), change);
   const tree = fieldsOf(local.schema.setup, local.schema.root);
   const named = Object.fromEntries(tree.map((f) => [f.key, f]));
   const plain = tree.filter((f) => !f.children);
   const group = (f) => h("details", { class: "group", open: local.open.has(f.key), ontoggle: (e) => local.open[e.target.open ? "add" : "delete"](f.key) },
     h("summary", { data: { key: `group-${f.key}` } }, h("span", {}, WORDS[f.key] ?? title(f.key)), h("span", { class: "glance num" }, glance(f.key, draft))),
-    h("div", { class: "fields" }, f.children.map((c) => (c.children ? [h("p", { class: "soft small" }, WORDS[c.key] ?? title(c.key)), c.children.map((d) => one(d))] : one(c)))));
+    h("div", { class: "fields" }, f.children.map((c) => (c.children ? [h("p", { class: "soft small" }, WORDS[c.key] ?? title(c.key)), c.children.map((d) => one(d))] : one(c))),
+      f.key === "base" && button("Fit to touched points…", () => { local.fit ??= newFit(); shell.drawer.open = true; shell.draw(); shell.drawer.draw(); }, { key: "fit-open" })));
   return [h("div", {}, plain.map((f) => one(f))), h("div", {}, GROUPS.filter((k) => named[k]).map((k) => group(named[k])))];
+}
+
+const robotSchema = (schema, robots) => ({ ...schema, choices: robots.map((r) => [r.name, `${r.title}, ${fixed(r.reach_mm, 0)} mm`]) });
+
+/** The fit of BASE to touched points, while somebody does it. */
+export function drawer(shell) {
+  const local = shell.local.cell;
+  if (!local?.fit || !shell.project.data.setup) return { tabs: [], stamp: "" };
+  const { setup } = shell.project.data;
+  const use = (base) => {
+    const draft = local.draft ?? setup;
+    const rounded = Object.fromEntries(AXES.map((a) => [poseKey(a), Number(base[poseKey(a)].toFixed(6))]));
+    local.draft = { ...draft, base: { ...draft.base, ...rounded } };
+    local.fit = null;
+    shell.draw();
+  };
+  return { stamp: "fit", tabs: [{ key: "fit", title: "BASE from touched points", draw: (body) => baseFit(body, local.fit, shell.project.id, () => (local.draft ?? setup).placement, use) }] };
 }
 
 /** The numbers of a group in one line. */

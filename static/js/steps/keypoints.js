@@ -4,16 +4,18 @@ import { post } from "../api.js";
 import { button, h } from "../dom.js";
 import { isOf, planned } from "../drawer/tables.js";
 import { AXES, deg, isAngle, mm, num, pct } from "../format.js";
-import { tag, toneOf, verdict } from "../status.js";
+import { tag, toneOf, verdict, working } from "../status.js";
 
 export const pick = "keypoints";
 export const watchesView = true;
+export const watchesJobs = true;
 const ASKED = [0.1, 0.3];
 
 export function content(shell) {
   const { part, keypoints, insight, setup } = shell.project.data;
   if (!part) return verdict("none", "No part yet", "Load one in step Part.");
   const n = keypoints?.length ?? 0;
+  if (shell.busy("suggest") || shell.local.suggesting) return working(shell, "Choosing key points", "suggest");
   const view = shell.view.state;
   const picking = view?.pick === "keypoints";
   shell.view.say(picking ? (n ? null : "Click on the tinted surface to place key points. Shift-click deletes one.") : null);
@@ -31,7 +33,7 @@ export function content(shell) {
 }
 
 function judged(n, insight) {
-  if (!insight) return verdict("none", `${n} key ${n === 1 ? "point" : "points"}`, "Computing coverage and accuracy…");
+  if (!insight) return [verdict("busy", `${n} key ${n === 1 ? "point" : "points"}`, "Computing coverage and accuracy. You can go on picking."), h("div", { class: "seeking", role: "progressbar", "aria-label": "Computing coverage and accuracy" })];
   const errors = insight.issues.filter((i) => i.severity === "error").length;
   const warnings = insight.issues.filter((i) => i.severity === "warning").length;
   if (errors) return verdict("bad", `${errors} to solve`, "Delete or move the marked points.");

@@ -4,7 +4,7 @@ import { button, fill, h } from "../dom.js";
 import { table } from "../drawer/tables.js";
 import { AXES, deg, facts, fixed, isAngle, mm, num, pct, poseKey, whole } from "../format.js";
 import { share } from "../journey.js";
-import { issueList, verdict } from "../status.js";
+import { issueList, verdict, working } from "../status.js";
 
 export const watchesView = true;
 export const watchesJobs = true;
@@ -12,7 +12,8 @@ export const watchesJobs = true;
 export function content(shell) {
   const { plan, part } = shell.project.data;
   if (!part) return verdict("none", "No part yet", "Load one in step Part.");
-  if (!plan) return verdict("none", "Nothing is planned yet", "Planning lays both paths, checks tilt, standoff, reach and collision, and writes the programs.");
+  if (shell.busy("plan")) return working(shell, "Planning", "plan");
+  if (!plan) return verdict("none", "No paths yet", "Planning lays both paths, checks tilt, standoff, reach and collision, and writes the programs.");
   const errors = plan.issues.filter((i) => i.severity === "error").length;
   const local = (place(shell));
   const chosen = plan[local.path];

@@ -4,12 +4,15 @@ import { href } from "../api.js";
 import { h } from "../dom.js";
 import { programs as krl } from "../drawer/krl.js";
 import { bytes, facts, fixed, whole } from "../format.js";
-import { issueList, verdict } from "../status.js";
+import { issueList, verdict, working } from "../status.js";
 
 export const KINDS = [["alignment", "Alignment scan"], ["inspection", "Inspection"]];
 
+export const watchesJobs = true;
+
 export function content(shell) {
   const { plan } = shell.project.data;
+  if (shell.busy("plan")) return working(shell, "Planning", "plan");
   if (!plan) return verdict("none", "No programs yet", "Plan the paths first.");
   return [KINDS.map(([kind, title]) => program(shell, kind, title, plan.programs?.[kind], plan[kind]?.program)),
     h("p", { class: "soft small" }, "Dry-run every program in T1 before you let it run by itself.")];

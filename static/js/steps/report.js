@@ -1,10 +1,11 @@
 // Step 9: hand over: the corrected program, the report, and the proof by the inspection scan itself.
 
-import { href } from "../api.js";
+import { get, href } from "../api.js";
 import { button, h } from "../dom.js";
 import { programs as krl } from "../drawer/krl.js";
+import { histograms, surfaceMaps } from "../drawer/plots.js";
 import { fixed, mm, pct } from "../format.js";
-import { issueList, verdict } from "../status.js";
+import { issueList, verdict, working } from "../status.js";
 import { accept } from "./alignment.js";
 import { program } from "./programs.js";
 import { drop, rehearse } from "./scan.js";
@@ -15,8 +16,10 @@ const link = (path, text, props = {}) => h("a", { class: "btn", style: { textDec
 export function content(shell) {
   const { alignment: a, assessment } = shell.project.data;
   const local = (shell.local.report ??= { base: "", path: "corrected", progress: null });
+  if (shell.busy("assessment")) return working(shell, "Assessing", "assessment");
   if (!a) return [verdict("none", "Nothing to report yet", "Align first."), archive(shell)];
   return [
+    shell.busy("simulate") && working(shell, "Rehearsing", "simulate"),
     program(shell, "corrected", "Corrected inspection", a.program, a.corrected_program ?? a.export ?? null),
     h("div", { class: "row" }, link(`${shell.project.path}/alignments/${a.number}/report`, "Open the report", { target: "_blank", rel: "noopener" }), link(`${shell.project.path}/alignments/${a.number}/report?download=true`, "Save it", { download: "" }), link(`${shell.project.path}/alignments/${a.number}/files`, "Data (zip)", { download: "" })),
     h("section", { class: "stack" }, h("h3", {}, "Inspection scan"), assessment ? judged(assessment) : h("p", { class: "soft small" }, "Upload the inspection scan (and the one from before the correction), or rehearse them, to see whether the front-wall echo stayed within 2 dB.")),
@@ -49,7 +52,16 @@ export function footer(shell) {
 }
 
 export function drawer(shell) {
-  const { alignment: a } = shell.project.data;
-  if (!a?.program?.available) return { tabs: [], stamp: "" };
-  return { stamp: `${a.number}`, tabs: [{ key: "corrected", title: "KRL, corrected", draw: (body, alive) => krl(body, alive, `${shell.project.path}/programs/corrected`) }] };
+  const { alignment: a, assessment } = shell.project.data;
+  let loaded = null;
+  const charts = () => (loaded ??= get(`${shell.project.path}/assessments/${assessment.number}/charts`));
+  const tabs = [
+    ...(assessment ? [
+      { key: "standoff", title: "Front wall", draw: async (body, alive) => surfaceMaps(body, alive, await charts(), "mm") },
+      { key: "amplitude", title: "Amplitude", draw: async (body, alive) => surfaceMaps(body, alive, await charts(), "dB") },
+      { key: "spread", title: "Before and after", draw: async (body, alive) => histograms(body, alive, ...(await charts()).histograms) },
+    ] : []),
+    ...(a?.program?.available ? [{ key: "corrected", title: "KRL, corrected", draw: (body, alive) => krl(body, alive, `${shell.project.path}/programs/corrected`) }] : []),
+  ];
+  return { stamp: `${a?.number} ${assessment?.number}`, tabs };
 }

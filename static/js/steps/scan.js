@@ -4,8 +4,8 @@ import { del, get, upload } from "../api.js";
 import { askRehearsal } from "../dialog.js";
 import { button, h } from "../dom.js";
 import { histograms, maps, profile } from "../drawer/plots.js";
-import { AXES, bytes, isAngle } from "../format.js";
-import { verdict } from "../status.js";
+import { AXES, bytes, isAngle, poseKey } from "../format.js";
+import { verdict, working } from "../status.js";
 
 export const watchesView = true;
 export const watchesJobs = true;
@@ -14,7 +14,8 @@ export function content(shell) {
   const { scans, plan } = shell.project.data;
   const local = (shell.local.scan ??= { base: "", path: "alignment", progress: null });
   return [
-    scans?.length ? list(shell, scans) : verdict("none", "No scan yet", plan ? "Run the alignment program on the robot and upload its readings. No robot at hand: rehearse." : "Plan the paths first."),
+    shell.busy("simulate") && working(shell, "Rehearsing", "simulate"),
+    scans?.length ? list(shell, scans) : shell.busy("simulate") ? null : verdict("none", "No scan yet", plan ? "Run the alignment program on the robot and upload its readings. No robot at hand: rehearse." : "Plan the paths first."),
     local.progress ? h("div", { class: "stack" }, h("span", {}, local.progress.text), h("progress", { value: local.progress.share, max: 1 }), button("Cancel", local.progress.cancel, { class: "tiny" })) : drop(shell, local),
     colours(shell, scans),
   ];
@@ -66,7 +67,11 @@ export function draw(setup) {
 export async function rehearse(shell, path) {
   // The part stays where it is between the scans of one rehearsal.
   const known = shell.project.data.scans?.filter((s) => s.path === "alignment" && s.origin === "simulated").at(-1)?.detail?.options?.offset ?? null;
-  const body = await askRehearsal(path, draw(shell.project.data.setup), path === "alignment" ? null : known);
+  // A sample brings an offset of its own; any other part hides where its fixture may leave it.
+  const sample = (await get("/samples").catch(() => [])).find((s) => s.sha256 === shell.project.data.part?.sha256);
+  const own = sample && Object.fromEntries(AXES.map((a) => [a, sample.hidden_offset[poseKey(a)]]));
+  const last = known && Object.fromEntries(AXES.map((a) => [a, known[poseKey(a)]]));
+  const body = await askRehearsal(path, draw(shell.project.data.setup), { own, last: path === "alignment" ? null : last });
   if (body) { await shell.do(async () => { await shell.project.run("/simulate", body); await shell.view.refresh(); }); }
 }
 
