@@ -31,6 +31,9 @@ from planner.toolpath import ToolPath
 LEAST_PATCHES = 6
 LEAST_READINGS = 30
 SIGMA_FLOOR_MM = 0.01
+# A patch of at least so many readings that scatter by no more than so many of their usual deviation shows the part.
+SHAPE_READINGS = 5
+SHAPE_SCATTER = 3.0
 
 
 def align(
@@ -89,7 +92,7 @@ def _finish(
     setup, curved = problem.setup, problem.curved
     centre = problem.centre_mm(T_base_part)
     T_base_basecorr = problem.T_base_basecorr(T_base_part)
-    residual = residual_of(patches, rows, used)
+    residual = residual_of(patches, rows, used | shape_of(patches, rows, setup))
     if residual.readings < LEAST_READINGS or used.sum() < LEAST_PATCHES:
         issues.append(_too_few(residual.readings))
     shift_mm, turn_deg = nominal_shift(setup, T_base_part, curved.surface.centroid_part)
@@ -126,6 +129,17 @@ def _finish(
         points_base=rows.foot_base[picked],
         deviation_mm=-rows.r[picked],
     )
+
+
+def shape_of(patches: Patches, rows: Rows, setup: Setup) -> NDArray[np.bool_]:
+    """Return the patches (p,) that show the part's shape, whether or not the rigid estimate could use them.
+
+    Bubbles scatter within a patch; a dent moves all of it. What stands off by more than twice the standoff tolerance is
+    taken for something else (a clamp, the table).
+    """
+    agree = patches.scatter_mm < SHAPE_SCATTER * max(patches.sigma_mm, SIGMA_FLOOR_MM)
+    near = np.abs(rows.r) < 2.0 * setup.tolerances.standoff_mm
+    return rows.valid & agree & near & (patches.count >= SHAPE_READINGS)
 
 
 def residual_of(patches: Patches, rows: Rows, used: NDArray[np.bool_]) -> Residual:

@@ -19,6 +19,7 @@ STEPS = 40
 READING_SIGMA_MM = 0.3
 FLOOR_MM = 0.05
 LEAST_VALID = 12
+LEAST_SHARE = 1.0 / 16.0
 
 
 @dataclass(frozen=True, eq=False)
@@ -59,6 +60,7 @@ def capture(cloud: PointCloud, problem: Problem, start: Transform | None = None,
     heard = reading_weights(cloud)[rows]
     T = problem.T_base_nominal if start is None else start
     scatter, valid_share, inlier_share, converged = np.inf, 0.0, 0.0, False
+    last, share = np.inf, 1.0
     for i in range(STEPS):
         found = distance_rows(problem.curved, T, problem.centre_mm(T), origins, distance, beams)
         use = found.valid & (heard > 0)
@@ -73,8 +75,13 @@ def capture(cloud: PointCloud, problem: Problem, start: Transform | None = None,
         weight = heard[use] * robust / READING_SIGMA_MM**2
         normal = (x * weight[:, None]).T @ x + np.eye(6)
         z = np.asarray(np.linalg.solve(normal, -(x * weight[:, None]).T @ r - problem.total(T)))
-        T = problem.step(T, z)
-        if i >= CONVEX_STEPS and problem.moves_mm(z) < 0.2 * FLOOR_MM:
+        moves = problem.moves_mm(z)
+        # Readings that come and go with the scale can make the steps swing to and fro: then shorter ones.
+        if i > CONVEX_STEPS and moves > 0.8 * last:
+            share = max(0.5 * share, LEAST_SHARE)
+        last = moves
+        T = problem.step(T, share * z)
+        if i >= CONVEX_STEPS and share * moves < 0.2 * FLOOR_MM:
             converged = True
             break
     return Captured(T, converged, float(scatter), valid_share, inlier_share)

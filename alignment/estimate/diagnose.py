@@ -59,7 +59,10 @@ def diagnose_fit(cloud: PointCloud, problem: Problem, found: MapFit) -> list[Iss
     lost = sigma > SUSPICIOUS_MM or share < SUSPICIOUS_SHARE
     if lost or _beyond_limits(found, problem):
         hypotheses += place_hypotheses(problem.setup)
-    better = _best(cloud, problem, max(sigma, _own_scatter(cloud, problem)), hypotheses, _beyond_limits(found, problem))
+    own = _own_scatter(cloud, problem)
+    # Of a part that sprang back the careful fit may leave more than the quick one: what counts is what fits at all.
+    scatter = own if np.isfinite(own) else sigma
+    better = _best(cloud, problem, scatter, hypotheses, _beyond_limits(found, problem))
     if better is not None:
         # A scan that fits as it stands, only far from nominal, may be just that: two readings of it are possible, and
         # the engineer who knows the fixture decides.

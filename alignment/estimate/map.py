@@ -33,6 +33,9 @@ SOLVED_MM = 2e-5
 RUNAWAY_MM = 30.0
 # Directions turn with the part as held ones go back to nominal; they are judged again where it came to rest.
 ROUNDS = 2
+# A misfit (rms, mm) that no robot's noise explains, and how much more of it than needed an estimate may leave.
+SHAPE_MM = 0.1
+MUCH_WORSE = 1.1
 # Noise models that are enough to step with; the last round takes them all.
 FEW = 8
 
@@ -96,6 +99,7 @@ def align_map(cloud: PointCloud, curved: CurvedSurface, setup: Setup, edges: boo
         free = _solve(state, system, mix, np.zeros((6, 0)))
         held = held_basis(free.covariance[:6, :6], problem.lock_rows(T))
         state, converged = _settle(state, system, mix, held)
+    state = _plain_if_sprung(state, system, robust.T_base_part, held)
     T = state.T_base_part
     post = _solve(state, system, mix, held)
     scale = problem.prior_sigma
@@ -156,6 +160,24 @@ def _settle(state: State, system: System, mix: Mixture, held: Array) -> tuple[St
         if moves < SOLVED_MM:
             break
     return state, moves < 100.0 * SOLVED_MM
+
+
+def _plain_if_sprung(state: State, system: System, T_plain: Transform, held: Array) -> State:
+    """Return the plain robust fit instead, where the careful one took the shape of a part that sprang back for noise.
+
+    What is left is then no noise of a robot, and the best rigid placement is the one that leaves least of it.
+    """
+    plain = system.problem.step(T_plain, -(held @ (held.T @ system.problem.total(T_plain))))
+    left, least = (_rms_mm(system, T) for T in (state.T_base_part, plain))
+    if least > SHAPE_MM and left > MUCH_WORSE * least:
+        return replace(state, T_base_part=plain)
+    return state
+
+
+def _rms_mm(system: System, T_base_part: Transform) -> float:
+    rows = system.surface(T_base_part)
+    used = system.used & rows.valid
+    return float(np.sqrt(np.average(rows.r[used] ** 2, weights=system.patches.count[used]))) if used.any() else np.inf
 
 
 def _edge_report(state: State, system: System, post: Posterior) -> dict[str, Any] | None:
