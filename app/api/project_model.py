@@ -148,7 +148,10 @@ class StoreModel:
             row = results.latest(session, self._id, "alignment")
             if row is None or row.verdict == "fail" or changed_since(session, row):
                 return None
-        return cast(Found, self._keep("found", (row.sha256, id(self.surface())), lambda: found_of(row, self.setup())))
+        return cast(
+            Found,
+            self._keep("found", (row.sha256, id(self.surface())), lambda: found_of(self._store, row, self.setup())),
+        )
 
     def subscribe(self, callback: Callable[[Topic], None]) -> Callable[[], None]:
         """Call back at every change."""

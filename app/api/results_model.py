@@ -1,16 +1,20 @@
 """Nouns behind results, for the 3D view: planned paths, the cloud of a scan, where an alignment found the part."""
 
+import io
 import tempfile
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
+import numpy as np
+
 from app.jobs.specs import suffix_of
 from app.store import inputs, results, scans
+from app.store.content import get_bytes
 from app.store.store import Store
 from app.store.tables import ResultRow
 from app.view.model import Found
-from planner.frames import AXES, Transform
+from planner.frames import AXES, Array, Transform
 from planner.placement import corrected_base, part_from_correction
 from planner.setup import Setup
 
@@ -65,8 +69,18 @@ def correction_of(row: ResultRow) -> Transform:
     return Transform.from_xyzabc("base", "basecorr", six)
 
 
-def found_of(row: ResultRow, setup: Setup) -> Found:
-    """Return where an alignment found the part."""
+def found_of(store: Store, row: ResultRow, setup: Setup) -> Found:
+    """Return where an alignment found the part, and in which shape if its poses follow that."""
     T_base_part = part_from_correction(correction_of(row), setup.T_base_partnom)
     status = {k["id"]: (k["status"], k.get("reason")) for k in row.summary.get("keypoints", [])}
-    return Found(T_base_part, row.verdict, status)
+    followed = (row.summary.get("non_rigid") or {}).get("applied", False)
+    return Found(T_base_part, row.verdict, status, _shape(store, row) if followed else None)
+
+
+def _shape(store: Store, row: ResultRow) -> tuple[Array, Array] | None:
+    with store.db.read() as session:
+        file = inputs.files_of(session, row.project_id, f"alignment:{row.number}").get("correction/field.npz")
+    if file is None:
+        return None
+    with np.load(io.BytesIO(get_bytes(store.blobs, file.sha256)), allow_pickle=False) as arrays:
+        return arrays["nodes"], arrays["values"]

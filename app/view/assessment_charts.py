@@ -3,6 +3,7 @@
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from alignment.metrics import Assessment
 from app.view.charts import histogram
@@ -12,6 +13,8 @@ from planner.frames import Array
 
 MAX_CELLS_ALONG = 240
 LEAST_CELL_MM = 1.0
+MOST_HOLES = 0.02
+LEAST_CELLS = 8
 AXES = ("X", "Y", "Z")
 
 
@@ -59,10 +62,15 @@ def _map(feet: Array, values: Array, axes: tuple[int, int]) -> dict[str, Any]:
         return {"x0": 0.0, "y0": 0.0, "cell_mm": LEAST_CELL_MM, "z": [[None]], **names}
     low, span = places.min(axis=0), np.ptp(places, axis=0)
     cell = max(float(span.max()) / MAX_CELLS_ALONG, LEAST_CELL_MM)
-    columns, rows = (int(n) for n in span // cell + 1)
-    x, y = ((places - low) // cell).astype(np.int64).T
-    place = y * columns + x
-    count = np.bincount(place, minlength=rows * columns)
+    # Cells narrower than the gaps between poses would draw stripes that are not there: widen them until few are empty.
+    while True:
+        columns, rows = (int(n) for n in span // cell + 1)
+        x, y = ((places - low) // cell).astype(np.int64).T
+        place = y * columns + x
+        count = np.bincount(place, minlength=rows * columns)
+        if _holes(count.reshape(rows, columns) > 0) <= MOST_HOLES or min(columns, rows) < LEAST_CELLS:
+            break
+        cell *= 1.25
     total = np.bincount(place, values[known], rows * columns)
     mean = np.divide(total, count, out=np.full(rows * columns, np.nan), where=count > 0)
     rounded = np.round(mean, 3).astype(object)
@@ -75,3 +83,11 @@ def _map(feet: Array, values: Array, axes: tuple[int, int]) -> dict[str, Any]:
         "z": rounded.reshape(rows, columns).tolist(),
         **names,
     }
+
+
+def _holes(filled: NDArray[np.bool_]) -> float:
+    """Return the share of cells (rows, columns) that are empty between filled ones, left and right or above and below."""
+    across = np.zeros_like(filled)
+    across[:, 1:-1] |= filled[:, :-2] & filled[:, 2:]
+    across[1:-1] |= filled[:-2] & filled[2:]
+    return float((across & ~filled).sum() / max(int(filled.sum()), 1))

@@ -5,7 +5,7 @@ from typing import Any
 import numpy as np
 
 from alignment.cloud import PointCloud
-from app.view.deviation import deviation, symmetric_limit
+from app.view.deviation import deviation, less_shape, symmetric_limit
 from app.view.model import ProjectModel
 from planner.errors import fail
 from planner.frames import Array
@@ -36,7 +36,8 @@ def deviation_chart(model: ProjectModel) -> dict[str, Any]:
     found = model.found()
     nominal = assume_nominal(model.setup().T_base_partnom)
     poses = {"before": nominal} | ({"after": found.T_base_part} if found else {})
-    measured = {name: deviation(cloud, surface, pose).values_mm for name, pose in poses.items()}
+    shapes = {"after": found.shape if found else None}
+    measured = {n: less_shape(deviation(cloud, surface, pose), shapes.get(n)).values_mm for n, pose in poses.items()}
     return {
         "title": "Deviation along the normal",
         "unit": "mm",

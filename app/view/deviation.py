@@ -4,6 +4,7 @@ from dataclasses import dataclass
 
 import numpy as np
 import trimesh
+from scipy.interpolate import RBFInterpolator
 from scipy.spatial import cKDTree
 
 from alignment.cloud import PointCloud
@@ -44,6 +45,16 @@ def deviation(cloud: PointCloud, surface: InspectionSurface, T_base_part: Transf
     values = height - cloud.distance_mm[index] if cloud.beams_base is not None else height
     good = inside & np.isfinite(values) & (np.linalg.norm(corners[:, 0] - corners[:, 1], axis=1) > 0)
     return Deviation(foot[good], values[good])
+
+
+def less_shape(measured: Deviation, shape: tuple[Array, Array] | None) -> Deviation:
+    """Return what is left of a deviation where the poses follow the shape of the part: places (m, 3), values (m,), mm."""
+    if shape is None or not len(measured.feet):
+        return measured
+    places, values = shape
+    # Linear kernel: the places may lie in a plane, where smoother ones have no unique answer.
+    follow = RBFInterpolator(places, values, neighbors=min(12, len(places)), kernel="linear")
+    return Deviation(measured.feet, measured.values_mm - follow(measured.feet))
 
 
 def _closest(surface: InspectionSurface, points: Array) -> tuple[Array, np.ndarray, Array]:

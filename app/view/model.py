@@ -57,15 +57,15 @@ class Insight:
 class Found:
     """Where an alignment found the part.
 
-    T_base_part: the real part in the nominal base. keypoint_status: id -> (status, reason). field_mm (v,): non-rigid
-    displacement along the normal at `InspectionSurface.vertices`, None for a rigid result; NaN outside its support.
+    T_base_part: the real part in the nominal base. keypoint_status: id -> (status, reason). shape: the displacement
+    along the normal that adapted poses follow, as places (m, 3), part, mm, and values (m,), mm; None for a rigid result.
     verdict: pass, partial or fail.
     """
 
     T_base_part: Transform
     verdict: str
     keypoint_status: dict[str, tuple[str, str | None]] = field(default_factory=dict)
-    field_mm: Array | None = None
+    shape: tuple[Array, Array] | None = None
 
 
 @runtime_checkable

@@ -6,7 +6,7 @@ import numpy as np
 import viser
 
 from app.view import colour
-from app.view.deviation import deviation, symmetric_limit
+from app.view.deviation import deviation, less_shape, symmetric_limit
 from app.view.draw_keypoints import draw_keypoints, marks
 from app.view.draw_part import (
     Shape,
@@ -155,7 +155,7 @@ class Stage:
         nominal = assume_nominal(self.model.setup().T_base_partnom)
         reach = max(self.model.setup().probe.swath_mm * 0.35, self.sheet.size_mm / 60.0)
         for layer, pose in (("before", nominal), ("after", self.found.T_base_part)):
-            measured = deviation(cloud, surface, pose)
+            measured = less_shape(deviation(cloud, surface, pose), self.found.shape if layer == "after" else None)
             limit = symmetric_limit(measured.values_mm)
             self.legends[layer] = draw_deviation(self.server, self.sheet, measured, layer, limit, reach)
 

@@ -35,7 +35,7 @@ export function askAcceptance(reasons) {
 }
 
 /** Ask for the hidden truth of a rehearsal. `draw()` makes one; `own` is the sample's, `last` where the part was hidden before. */
-export function askRehearsal(path, draw, { own = null, last = null } = {}) {
+export function askRehearsal(path, draw, { own = null, last = null, springBack = 0 } = {}) {
   const inputs = {};
   const six = h("div", { class: "six" }, AXES.map((axis) => {
     inputs[axis] = h("input", { type: "number", name: axis, step: "any", value: "0", required: true });
@@ -47,7 +47,7 @@ export function askRehearsal(path, draw, { own = null, last = null } = {}) {
   const number = (name, text, value, props) => labelled(text, h("input", { type: "number", name, value, step: "any", ...props }));
   return ask("Rehearse with the simulated scanner", `The ${path} program runs on a simulated robot. The part stands away from where the program believes it is; the alignment has to find out by how much.`,
     [six, h("div", { class: "row" }, last && button("As scanned", () => shuffle(last), { title: "Where the part stood in the last alignment scan" }), own && button("The sample's", () => shuffle(own), { title: "The offset that belongs to this sample" }), button("Random", () => shuffle(), { title: "Drawn from the fixture's tolerance in the cell" }), h("label", { class: "row tight" }, hide, "Do not show me")),
-      h("div", { class: "six" }, number("spring", "Spring back (mm)", "0", { min: -100, max: 100 }), number("outliers", "Outliers (%)", "0", { min: 0, max: 90 }), number("dropouts", "Dropouts (%)", "0", { min: 0, max: 90 }))],
+      h("div", { class: "six" }, number("spring", "Spring back (mm)", String(springBack), { min: -100, max: 100 }), number("outliers", "Outliers (%)", "0", { min: 0, max: 90 }), number("dropouts", "Dropouts (%)", "0", { min: 0, max: 90 }))],
     "Run", (f) => ({
       path,
       offset: Object.fromEntries(AXES.map((a) => [`${a}_${isAngle(a) ? "deg" : "mm"}`, Number(inputs[a].value)])),

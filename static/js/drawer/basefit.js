@@ -2,7 +2,7 @@
 
 import { post } from "../api.js";
 import { button, fill, h } from "../dom.js";
-import { AXES, fixed, mm, ofAxis, poseKey } from "../format.js";
+import { AXES, fixed, isAngle, mm, ofAxis, poseKey } from "../format.js";
 import { issueList } from "../status.js";
 
 const XYZ = ["x", "y", "z"];
@@ -48,7 +48,7 @@ export function baseFit(body, fit, project, placement, use) {
     h("td", { class: "num" }, mm(fit.answer?.pairs[row]?.residual_mm)), h("td", { class: "num" }, mm(fit.answer?.pairs[row]?.left_out_mm)),
     h("td", {}, button("✕", () => { fit.pairs.splice(row, 1); fit.answer = null; again(); }, { class: "ghost tiny", "aria-label": `Delete pair ${row + 1}`, disabled: fit.pairs.length <= 1, key: `pair-del-${row}` }))));
   const go = button("Fit BASE", run, { class: "primary", disabled: ready < LEAST, key: "fit-base" });
-  const titles = ["Pair", "CAD X, mm", "CAD Y", "CAD Z", "Touched X, mm", "Touched Y", "Touched Z", "Residual, mm", "Left out, mm", ""];
+  const titles = ["Pair", "CAD X, mm", "CAD Y", "CAD Z", "Touched X", "Touched Y", "Touched Z", "Residual", "Left out", ""];
   fill(body, h("div", { class: "fit" },
     h("div", { class: "stack" }, h("p", { class: "soft small" }, "Touch three or more points with a calibrated spike. Type where they are on the CAD, and where the pendant says they are in WORLD (BASE 0). Blocks of numbers can be pasted."),
       h("table", { class: "pairs" }, h("thead", {}, h("tr", {}, titles.map((t, i) => h("th", { class: i === 0 ? "l" : null, scope: "col", title: t.startsWith("Left out") ? "Distance to the place that the other pairs give" : null }, t)))), h("tbody", {}, pairs)),
@@ -57,7 +57,8 @@ export function baseFit(body, fit, project, placement, use) {
 }
 
 function fitted(answer, use) {
-  return [h("table", { class: "fitted" }, h("tbody", {}, AXES.map((axis) => h("tr", {}, h("td", {}, axis.toUpperCase()), h("td", { class: "num" }, ofAxis(axis, answer.base[poseKey(axis)])), h("td", { class: "unit l" }, "abc".includes(axis) ? "deg" : "mm"))))),
+  const value = (axis) => [h("td", {}, axis.toUpperCase()), h("td", { class: "num" }, ofAxis(axis, answer.base[poseKey(axis)])), h("td", { class: "unit l" }, isAngle(axis) ? "deg" : "mm")];
+  return [h("table", {}, h("tbody", {}, [0, 1, 2].map((i) => h("tr", {}, value(AXES[i]), value(AXES[i + 3]))))),
     h("p", { class: "soft small" }, `Residuals ${fixed(answer.rms_mm, 3)} mm rms; one touch is good to ${fixed(answer.sigma_mm, 3)} mm per axis.`),
     button("Use this BASE", () => use(answer.base), { class: "primary", key: "use-base" })];
 }

@@ -46,6 +46,17 @@ export function histograms(body, alive, ...charts) {
   })));
 }
 
+/** Histograms with all series of a chart in one box, on one scale. */
+export function overlaid(body, alive, ...charts) {
+  return draw(body, alive, charts.map((chart) => {
+    const series = Object.entries(chart.series);
+    const traces = series.map(([name, s]) => ({ type: "bar", name: TITLES[name] ?? name, x: s.edges.slice(1).map((e, i) => (e + s.edges[i]) / 2), y: s.counts, opacity: 0.75, marker: { color: name === "before" ? "#9aa5af" : css("--accent") }, hovertemplate: `${TITLES[name] ?? name}, %{x:.3f} ${chart.unit}: %{y}<extra></extra>` }));
+    const numbers = series.map(([name, s]) => `${TITLES[name] ?? name}: mean ${fixed(s.mean, 3)}, std ${fixed(s.std, 3)}`).join("; ");
+    const shapes = chart.tolerance ? [-1, 1].map((k) => ({ type: "line", x0: k * chart.tolerance, x1: k * chart.tolerance, y0: 0, y1: 1, yref: "paper", line: { color: css("--ink-3"), width: 1, dash: "dot" } })) : [];
+    return { traces, layout: layout(`${chart.title}<br><span style="font-size:11px">${numbers}</span>`, axis(chart.unit), axis("readings"), { shapes, barmode: "overlay", showlegend: true, legend: { x: 1, xanchor: "right", y: 1 }, margin: { l: 48, r: 14, t: 48, b: 38 } }) };
+  }));
+}
+
 /** Maps of laws by poses. */
 export function maps(body, alive, charts) {
   return draw(body, alive, charts.map((c) => ({

@@ -11,6 +11,7 @@ import { issueList, tag, toneOf, verdict, working } from "../status.js";
 
 export const watchesView = true;
 export const watchesJobs = true;
+const SHAPED = new Set(["sprung-back", "not-rigid"]);
 const WORDS = { pass: ["Pass", "The part is found; the corrected program may run after a dry run."], partial: ["Partial", "Usable only if you accept what is said below."], fail: ["Fail", "No corrected program is written."] };
 
 export function content(shell) {
@@ -24,6 +25,7 @@ export function content(shell) {
   return [
     a.stale ? verdict("warn", "Out of date", `Changed since: ${a.stale_because.join(", ")}.`) : a.accepted ? verdict("good", "Accepted", `By ${a.accepted.name}: ${a.accepted.reason}`) : verdict(toneOf(a.verdict), word, text),
     a.verdict !== "pass" && issueList(a.issues, 8),
+    follow(shell, a, local),
     correction(a, setup, hidden(shell)),
     paper(a, hidden(shell)),
     a.verdict !== "fail" && !a.stale && layers(shell, local),
@@ -72,6 +74,12 @@ function paper(a, truth) {
   return h("div", {}, h("h3", {}, "Beside it: the paper's key-point method"), h("table", {}, h("thead", {}, h("tr", {}, titles.map((t) => h("th", {}, t)))), h("tbody", {}, AXES.map((axis) => h("tr", {}, h("td", {}, `${axis.toUpperCase()} `, h("span", { class: "unit" }, isAngle(axis) ? "deg" : "mm")), cells(axis))))));
 }
 
+/** Offer to follow the shape of a part that is not as its CAD. */
+function follow(shell, a, local) {
+  if (a.stale || a.options?.non_rigid || !a.issues?.some((i) => SHAPED.has(i.code))) return null;
+  return h("div", { class: "row" }, button("Align again, following its shape", () => { local.method = "map"; local.non_rigid = true; local.open = true; run(shell, local); }, { key: "follow" }));
+}
+
 /** What was found of a part that sprang back. */
 function sprang(n) {
   if (!n) return null;
@@ -100,16 +108,19 @@ function options(shell, local) {
       h("label", { class: "field wide" }, "Edges", h("select", { name: "edges", onchange: (e) => { local.edges = e.target.value; } }, [["", "wherever the scan crosses them"], ["true", "always"], ["false", "never"]].map(([v, text]) => h("option", { value: v, selected: v === local.edges }, text))))));
 }
 
+function run(shell, local) {
+  return shell.do(async () => {
+    await shell.project.run("/alignments", { method: local.method, non_rigid: local.non_rigid, ...(local.edges ? { edges: local.edges === "true" } : {}) });
+    local.layer = "after";
+    if (shell.step === "alignment") await shell.view.send({ step: "alignment" });
+  });
+}
+
 export function footer(shell) {
   const { alignment: a, scans } = shell.project.data;
   const local = shell.local.alignment ?? {};
   const busy = shell.busy("alignment");
-  const run = () => shell.do(async () => {
-    await shell.project.run("/alignments", { method: local.method, non_rigid: local.non_rigid, ...(local.edges ? { edges: local.edges === "true" } : {}) });
-    local.layer = "after";
-    await shell.view.send({ step: "alignment" });
-  });
-  const again = button(busy ? "Aligning…" : a ? "Align again" : "Align", run, { class: a && !a.stale && !busy ? "tiny" : "primary", disabled: !scans?.length || busy, key: "align" });
+  const again = button(busy ? "Aligning…" : a ? "Align again" : "Align", () => run(shell, local), { class: a && !a.stale && !busy ? "tiny" : "primary", disabled: !scans?.length || busy, key: "align" });
   if (!a || a.stale || busy) return again;
   if (a.verdict === "partial" && !a.accepted) return [again, button("Accept…", () => accept(shell, a), { class: "primary" })];
   return [again, button("Continue: report", () => { location.hash = `#/p/${shell.project.id}/report`; }, { class: "primary", disabled: a.verdict === "fail" })];

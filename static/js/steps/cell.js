@@ -47,7 +47,7 @@ export function content(shell) {
   return [h("div", {}, plain.map((f) => one(f))), h("div", {}, GROUPS.filter((k) => named[k]).map((k) => group(named[k])))];
 }
 
-const robotSchema = (schema, robots) => ({ ...schema, choices: robots.map((r) => [r.name, `${r.title}, ${fixed(r.reach_mm, 0)} mm`]) });
+const robotSchema = (schema, robots) => ({ ...schema, choices: robots.map((r) => [r.name, r.title]) });
 
 /** The fit of BASE to touched points, while somebody does it. */
 export function drawer(shell) {

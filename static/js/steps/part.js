@@ -6,12 +6,12 @@ import { bytes, facts, num, size, whole } from "../format.js";
 import { verdict } from "../status.js";
 
 const UNITS = ["mm", "cm", "m", "inch"];
-const OWN_UNIT = /\.(step|stp|glb|gltf)$/i;
+const SIZE_IF = /([\d.e+-]+) x ([\d.e+-]+) x ([\d.e+-]+) mm if in (\w+)/g;
 
 export function content(shell) {
   const { part } = shell.project.data;
   const local = (shell.local.part ??= { unit: null, file: null, progress: null });
-  return [part && overview(part), local.file && !local.progress && unitQuestion(shell, local), local.progress ? progressOf(local) : drop(shell, local, part), !part && samples(shell)];
+  return [part && overview(part), local.sizes && !local.progress && unitQuestion(shell, local), local.progress ? progressOf(local) : drop(shell, local, part), !part && samples(shell)];
 }
 
 function overview(part) {
@@ -43,15 +43,15 @@ function choose(shell, local, file) {
   if (!file) return;
   local.file = file;
   local.unit = null;
-  if (OWN_UNIT.test(file.name)) send(shell, local);
-  else shell.draw();
+  local.sizes = null;
+  send(shell, local);
 }
 
+/** The file was read and says nothing of its unit: the sizes it would have help to tell. */
 function unitQuestion(shell, local) {
-  return h("fieldset", { class: "stack", style: { border: "1px solid var(--rule)", borderRadius: "6px", padding: "10px 14px" } },
-    h("legend", {}, h("h3", {}, "Unit")), h("p", {}, `${local.file.name} does not say in which unit its numbers are. Which one is it?`),
-    h("div", { class: "row" }, UNITS.map((u) => h("label", { class: "row tight" }, h("input", { type: "radio", name: "unit", value: u, checked: local.unit === u, onchange: () => { local.unit = u; shell.draw(); } }), u))),
-    button(`Upload ${local.file.name}`, () => send(shell, local), { disabled: !local.unit, key: "upload" }));
+  const choice = (u) => h("tr", {}, h("td", {}, h("label", { class: "row tight" }, h("input", { type: "radio", name: "unit", value: u, checked: local.unit === u, onchange: () => { local.unit = u; shell.draw(); } }), u)), h("td", { class: "num" }, local.sizes[u] ? `${local.sizes[u].map(size).join(" × ")} mm` : ""));
+  return h("section", { class: "stack" }, h("h3", {}, "Unit"), h("p", {}, `${local.file.name} does not say in which unit its numbers are. How large is the part?`),
+    h("table", {}, h("tbody", {}, UNITS.map(choice))), button(`Take ${local.file.name}${local.unit ? ` in ${local.unit}` : ""}`, () => send(shell, local), { disabled: !local.unit, key: "upload", class: "primary" }));
 }
 
 function send(shell, local) {
@@ -64,7 +64,12 @@ function send(shell, local) {
     shell.draw();
     try {
       await job.promise;
-      local.file = null;
+      local.file = local.sizes = null;
+    } catch (error) {
+      const missing = error.issues?.find((i) => i.code === "unit-missing");
+      if (!missing) { local.file = local.sizes = null; throw error; }
+      local.sizes = Object.fromEntries([...missing.message.matchAll(SIZE_IF)].map(([, x, y, z, unit]) => [unit, [x, y, z].map(Number)]));
+      return;
     } finally { local.progress = null; }
     await shell.project.load(["part"]);
     await shell.view.send({ step: "part", camera: "iso" });

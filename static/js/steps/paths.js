@@ -74,7 +74,7 @@ function walker(shell, local) {
 export function footer(shell) {
   const { plan, part } = shell.project.data;
   const busy = shell.busy("plan");
-  const run = () => shell.do(async () => { await shell.project.run("/plan"); await shell.view.refresh(); });
+  const run = () => shell.do(async () => { await shell.project.run("/plan"); if (shell.step === "paths" && shell.project.data.plan) show(shell, place(shell), place(shell).path); });
   if (!plan || plan.stale || busy) return button(busy ? "Planning…" : plan ? "Plan again" : "Plan both paths", run, { class: "primary", disabled: !part || busy, key: "plan" });
   return [button("Plan again", run, { class: "tiny", key: "again" }), button("Continue: programs", () => { location.hash = `#/p/${shell.project.id}/programs`; }, { class: "primary" })];
 }

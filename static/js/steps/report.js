@@ -3,7 +3,7 @@
 import { get, href } from "../api.js";
 import { button, h } from "../dom.js";
 import { programs as krl } from "../drawer/krl.js";
-import { histograms, surfaceMaps } from "../drawer/plots.js";
+import { overlaid, surfaceMaps } from "../drawer/plots.js";
 import { fixed, mm, pct } from "../format.js";
 import { issueList, verdict, working } from "../status.js";
 import { accept } from "./alignment.js";
@@ -59,7 +59,7 @@ export function drawer(shell) {
     ...(assessment ? [
       { key: "standoff", title: "Front wall", draw: async (body, alive) => surfaceMaps(body, alive, await charts(), "mm") },
       { key: "amplitude", title: "Amplitude", draw: async (body, alive) => surfaceMaps(body, alive, await charts(), "dB") },
-      { key: "spread", title: "Before and after", draw: async (body, alive) => histograms(body, alive, ...(await charts()).histograms) },
+      { key: "spread", title: "Before and after", draw: async (body, alive) => overlaid(body, alive, ...(await charts()).histograms) },
     ] : []),
     ...(a?.program?.available ? [{ key: "corrected", title: "KRL, corrected", draw: (body, alive) => krl(body, alive, `${shell.project.path}/programs/corrected`) }] : []),
   ];

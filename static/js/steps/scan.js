@@ -66,12 +66,12 @@ export function draw(setup) {
 /** Ask for the hidden truth and run the simulated scanner. */
 export async function rehearse(shell, path) {
   // The part stays where it is between the scans of one rehearsal.
-  const known = shell.project.data.scans?.filter((s) => s.path === "alignment" && s.origin === "simulated").at(-1)?.detail?.options?.offset ?? null;
+  const known = shell.project.data.scans?.filter((s) => s.path === "alignment" && s.origin === "simulated").at(-1)?.detail?.options ?? null;
   // A sample brings an offset of its own; any other part hides where its fixture may leave it.
   const sample = (await get("/samples").catch(() => [])).find((s) => s.sha256 === shell.project.data.part?.sha256);
   const own = sample && Object.fromEntries(AXES.map((a) => [a, sample.hidden_offset[poseKey(a)]]));
-  const last = known && Object.fromEntries(AXES.map((a) => [a, known[poseKey(a)]]));
-  const body = await askRehearsal(path, draw(shell.project.data.setup), { own, last: path === "alignment" ? null : last });
+  const last = known?.offset && Object.fromEntries(AXES.map((a) => [a, known.offset[poseKey(a)]]));
+  const body = await askRehearsal(path, draw(shell.project.data.setup), { own, last: path === "alignment" ? null : last, springBack: path === "alignment" ? 0 : (known?.spring_back_mm ?? 0) });
   if (body) { await shell.do(async () => { await shell.project.run("/simulate", body); await shell.view.refresh(); }); }
 }
 
