@@ -51,8 +51,8 @@ def load_cloud(store: Store, project_id: str, setup: Setup, keep: Callable[[str,
 
         with tempfile.TemporaryDirectory(prefix="echobase-view-") as folder:
             sources = []
-            for place, (name, file) in enumerate(sorted(files.items())):
-                sources.append(Path(folder) / f"{place}{suffix_of(name)}")
+            for place, (name, file) in enumerate(sorted(files.items()), start=1):
+                sources.append(Path(folder) / f"scan-{scan.number}-{place}{suffix_of(name)}")
                 store.blobs.copy_to(file.sha256, sources[-1])
             read = read_scans(sources)
         T_world_corrected = None if last is None else corrected_base(setup.T_world_base, last)

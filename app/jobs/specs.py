@@ -110,10 +110,10 @@ def _scan_files(session: Session, chosen: list[ScanRow], folder: str) -> tuple[d
     """Return blobs by relative name, and those names in order. A name only keeps the suffix a reader goes by."""
     files: dict[str, str] = {}
     for scan in chosen:
-        for place, (name, row) in enumerate(
-            sorted(inputs.files_of(session, scan.project_id, f"scan:{scan.number}").items())
-        ):
-            files[f"{folder}/{scan.number}-{place}{suffix_of(name)}"] = row.sha256
+        own = sorted(inputs.files_of(session, scan.project_id, f"scan:{scan.number}").items())
+        for place, (name, row) in enumerate(own, start=1):
+            stem = f"scan-{scan.number}" if len(own) == 1 else f"scan-{scan.number}-{place}"
+            files[f"{folder}/{stem}{suffix_of(name)}"] = row.sha256
     return files, list(files)
 
 

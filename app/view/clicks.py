@@ -62,6 +62,8 @@ class Clicks:
         if browser.pick == "surface":
             if hit is not None:
                 view.draw.put(lambda: view.model.select_surface(hit.point[None], who))
+            else:
+                self._complain(picker is not None, None)
         elif delete:
             self._delete(origin, direction, who)
         else:

@@ -148,6 +148,7 @@ class ProjectView:
             self.clicks.listen(browser)
         if command.probe is not None:
             browser.probe = (command.probe.path, command.probe.at)
+            browser.shown.add("probe")
         if command.probe is not None or (command.step is not None and "probe" in browser.shown):
             self._place_probe(browser)
         browser.apply()

@@ -32,6 +32,7 @@ export function journey(data) {
   return STEPS.map(([id, name]) => {
     const state = { ...states[id] };
     if (told[id]?.state === "running") Object.assign(state, { tone: "busy", word: "working" });
+    else if (told[id]?.job?.state === "failed") Object.assign(state, { tone: "bad", word: "failed" });
     // What is not done yet says what to do.
     if (!state.fact && state.tone === "todo" && told[id]?.state !== "empty") state.fact = told[id]?.next ?? "";
     return { id, name, ...state };

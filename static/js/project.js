@@ -117,7 +117,12 @@ export class Project {
     this.data.jobs.set(job.id, job);
     this.changed("jobs");
     const over = await this.over(job.id);
-    if (over.state === "failed") throw new ApiError(422, over.error?.issues ?? over.issues ?? []);
+    if (over.state === "failed") {
+      // The event says that it failed; why is in the job itself.
+      const { issues } = await get(`/jobs/${job.id}`);
+      await this.load([]);
+      throw new ApiError(422, issues);
+    }
     if (over.state === "done") await this.load(ALL);
     return over;
   }

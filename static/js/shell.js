@@ -109,7 +109,9 @@ export class Shell {
   }
 
   problemList() {
-    const mine = this.problems[this.step] ?? [];
+    const told = this.project.data.state?.steps?.find((s) => s.name === this.step);
+    const failed = told?.job?.state === "failed" ? told.job.issues : [];
+    const mine = this.problems[this.step]?.length ? this.problems[this.step] : failed;
     const seen = this.project.data.viewIssues.filter((i) => Date.now() - i.at < 8000);
     if (seen.length) setTimeout(() => this.draw(), 8100);
     return issueList([...mine, ...seen]);

@@ -142,7 +142,15 @@ def align(folder: Path, scans, options: AlignOptions, progress):
 
 def assess(folder: Path, scan: Path, before: Path | None, progress):
     content = {"after": {"within_2db": 1.0}, "before": None, "improvement_pct": None}
-    return SimpleNamespace(content=content, artifacts={"assessment.json": json.dumps(content).encode()}, issues=())
+    artifacts = {"assessment.json": json.dumps(content).encode()}
+    return SimpleNamespace(content=content, artifacts=artifacts, issues=(), after=_judged(), before=None)
+
+
+def _judged() -> SimpleNamespace:
+    x, y = (v.ravel().astype(float) for v in np.meshgrid(np.arange(30), np.arange(20)))
+    yes = np.ones(len(x), dtype=bool)
+    maps = {"feet_part": np.stack([x, y, 0 * x], axis=1), "distance_mm": 15.0 + 0.01 * x, "db": 0.1 * y}
+    return SimpleNamespace(**maps, on_part=yes, centre=yes, bubble=~yes)
 
 
 def _obey(name: str, progress) -> None:
