@@ -12,16 +12,19 @@ from alignment.estimate.surface_rows import patch_rows
 from alignment.estimate.system import NUISANCES, EdgeData, nuisance_columns
 from planner.frames import Array, Transform
 
-STEPS = 40
+STEPS = 60
 SURFACE_FLOOR_MM = 0.01
 EDGE_FLOOR_MM = 0.05
 # Beyond this many robust standard deviations a patch or a crossing belongs to something else.
 REJECT = 5.0
 EDGE_REJECT = 4.0
 LEAST_CROSSINGS = 12
+# The scale of crossings: wide at first (mm), then narrower by this factor a step, and free from step ANNEALED on.
+WIDE_MM, WIDE_STEPS, NARROWER, ANNEALED = 3.0, 3, 0.7, 15
 # A row is never taken to know more than this (mm): noise is shared between rows.
 SHARED_MM = 0.1
 SETTLED_MM = 1e-3
+LEAST_SHARE = 1.0 / 32.0
 
 
 @dataclass(frozen=True, eq=False)
@@ -37,6 +40,7 @@ class RobustFit:
 def robust_fit(patches: Patches, problem: Problem, start: Transform, edges: EdgeData | None) -> RobustFit:
     """Return the placement of a robust fit (Tukey's biweight, scales from the data) of patches and crossings together."""
     T, settled = start, False
+    last, share = np.inf, 1.0
     used = np.zeros(len(patches), dtype=bool)
     base = np.minimum(patches.count, 50.0)
     base = base / (1.0 + base)
@@ -55,20 +59,45 @@ def robust_fit(patches: Patches, problem: Problem, start: Transform, edges: Edge
         normal[:6, :6] += (x * w[:, None]).T @ x
         pull[:6] -= (x * w[:, None]).T @ r
         if edges is not None:
-            edges = _add_edges(edges, problem, T, nuisance, normal, pull, first=i < 3)
-        z = np.linalg.solve(normal, pull)
+            edges = _add_edges(edges, problem, T, nuisance, normal, pull, _scale_limits(i))
+        z = share * np.linalg.solve(normal, pull)
         T = problem.step(T, z[:6])
         nuisance = nuisance + z[6:]
-        if problem.moves_mm(z[:6]) < SETTLED_MM and i >= 3:
+        moves = problem.moves_mm(z[:6])
+        # Rows that come and go with the scale can make the steps swing to and fro: then shorter ones.
+        if i > ANNEALED and moves > 0.8 * last:
+            share = max(0.5 * share, LEAST_SHARE)
+        last = moves
+        if moves < SETTLED_MM and i >= (3 if edges is None else ANNEALED):
             settled = True
             break
-    if edges is not None and edges.used.sum() < LEAST_CROSSINGS:
+    if edges is not None and (edges.used.sum() < LEAST_CROSSINGS or not settled):
+        # Crossings that do not agree on a place say nothing; the surface alone says what it can.
         return robust_fit(patches, problem, start, None)
     return RobustFit(T, used, edges, settled)
 
 
+def _scale_limits(i: int) -> tuple[float, float]:
+    """Return the least and the largest scale (mm) of the crossings at step i: wide, then narrower step by step, then free.
+
+    The scale of a poor start lets false crossings in, which keep the start poor; narrowing it whatever the residuals say
+    (graduated non-convexity, A. Blake, A. Zisserman, Visual Reconstruction, MIT Press 1987) leads to where most agree.
+    """
+    if i < WIDE_STEPS:
+        return WIDE_MM, np.inf
+    if i < ANNEALED:
+        return EDGE_FLOOR_MM, max(EDGE_FLOOR_MM, WIDE_MM * NARROWER ** (i - WIDE_STEPS))
+    return EDGE_FLOOR_MM, np.inf
+
+
 def _add_edges(
-    edges: EdgeData, problem: Problem, T: Transform, nuisance: Array, normal: Array, pull: Array, first: bool
+    edges: EdgeData,
+    problem: Problem,
+    T: Transform,
+    nuisance: Array,
+    normal: Array,
+    pull: Array,
+    limits_mm: tuple[float, float],
 ) -> EdgeData:
     """Add the crossings to the normal equations in place; return the edges with the crossings that belong."""
     found = edges.rows(problem, T)
@@ -77,9 +106,7 @@ def _add_edges(
     valid = found.valid
     if valid.sum() < LEAST_CROSSINGS:
         return replace(edges, used=valid & False)
-    sigma = mad_sigma(r[valid], EDGE_FLOOR_MM, about_zero=True)
-    if first:
-        sigma = max(sigma, 3.0)
+    sigma = float(np.clip(mad_sigma(r[valid], EDGE_FLOOR_MM, about_zero=True), *limits_mm))
     used = valid & (np.abs(r) < EDGE_REJECT * sigma)
     x = np.hstack([found.jacobian * problem.prior_sigma, columns])[used]
     w = tukey_weights(r[used], sigma) / (SHARED_MM + sigma) ** 2
