@@ -4,6 +4,7 @@ from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.ndimage import binary_closing
 
 from alignment.metrics import Assessment
 from app.view.charts import histogram
@@ -15,6 +16,7 @@ MAX_CELLS_ALONG = 240
 LEAST_CELL_MM = 1.0
 MOST_HOLES = 0.02
 LEAST_CELLS = 8
+WIDEST_GAP = 8
 AXES = ("X", "Y", "Z")
 
 
@@ -86,8 +88,7 @@ def _map(feet: Array, values: Array, axes: tuple[int, int]) -> dict[str, Any]:
 
 
 def _holes(filled: NDArray[np.bool_]) -> float:
-    """Return the share of cells (rows, columns) that are empty between filled ones, left and right or above and below."""
-    across = np.zeros_like(filled)
-    across[:, 1:-1] |= filled[:, :-2] & filled[:, 2:]
-    across[1:-1] |= filled[:-2] & filled[2:]
-    return float((across & ~filled).sum() / max(int(filled.sum()), 1))
+    """Return the share of cells (rows, columns) that are empty between filled ones of the same row or column."""
+    reach = np.ones((1, WIDEST_GAP + 1), dtype=bool)
+    closed = binary_closing(filled, reach) | binary_closing(filled, reach.T)
+    return float((closed & ~filled).sum() / max(int(filled.sum()), 1))

@@ -32,6 +32,7 @@ class Nursery:
         command = [sys.executable, "-W", "ignore", "-m", "tests.api.nursery"]
         pipe = subprocess.PIPE
         self._process = subprocess.Popen(command, cwd=ROOT, env=env, stdin=pipe, stdout=pipe, stderr=None)
+        self._early: list[bytes] = []
         atexit.register(self.close)
 
     @classmethod
@@ -48,9 +49,14 @@ class Nursery:
     def line(self, wanted: bytes) -> bytes:
         """Return the next line with `wanted` in it; the servers write their addresses here too."""
         assert self._process.stdout is not None
+        for place, line in enumerate(self._early):
+            if wanted in line:
+                return self._early.pop(place)
         while line := self._process.stdout.readline():
             if wanted in line:
                 return line
+            # A server may say its address before the nursery says that it was born.
+            self._early.append(line)
         raise AssertionError("the nursery ended")
 
     def close(self) -> None:

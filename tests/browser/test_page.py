@@ -8,24 +8,38 @@ import zipfile
 
 import numpy as np
 import pytest
+import trimesh
 
+from planner.setup import Pose
 from tests.browser import journey
 from tests.browser.eyes import Watch, bluish, picture, until
 from tests.browser.real_server import RealServer
 
 # A software renderer on busy cores takes its time.
 pytestmark = [pytest.mark.browser, pytest.mark.slow, pytest.mark.timeout(900)]
+SIX = ("x_mm", "y_mm", "z_mm", "a_deg", "b_deg", "c_deg")
 OFFSET = {"x": "1.1", "y": "-0.7", "z": "1.0", "a": "0.2", "b": "-0.8", "c": "0.5"}
 
 
-@pytest.fixture
-def server(tmp_path):
-    made = RealServer(tmp_path / "data")
+@pytest.fixture(scope="module")
+def server(tmp_path_factory):
+    made = RealServer(tmp_path_factory.mktemp("page") / "data")
     yield made
     made.stop()
 
 
-@pytest.fixture
+@pytest.fixture(scope="module")
+def pid(server):
+    """A planned flat plate, for the tests that leave it as it is."""
+    made = rest(server, "/projects", "POST", {"name": "Plate", "sample": "flat-plate"})["id"]
+    job = rest(server, f"/projects/{made}/plan", "POST", {})
+    with urllib.request.urlopen(f"{server.url}/api/v1/jobs/{job['id']}/events") as events:
+        events.read()
+    assert rest(server, f"/jobs/{job['id']}")["state"] == "done"
+    return made
+
+
+@pytest.fixture(scope="module")
 def page(server, chromium):
     context = chromium.new_context(viewport={"width": 1280, "height": 800}, accept_downloads=True)
     page = context.new_page()
@@ -34,8 +48,11 @@ def page(server, chromium):
     context.close()
 
 
-def rest(server, path):
-    with urllib.request.urlopen(f"{server.url}/api/v1{path}") as answer:
+def rest(server, path, method="GET", body=None):
+    sent = None if body is None else json.dumps(body).encode()
+    headers = {"Content-Type": "application/json"}
+    request = urllib.request.Request(f"{server.url}/api/v1{path}", sent, headers, method=method)
+    with urllib.request.urlopen(request) as answer:
         return json.load(answer)
 
 
@@ -71,8 +88,7 @@ def test_from_the_sample_to_the_corrected_program(server, page):
     truth = [float(v) for v in OFFSET.values()]
     # The page shows what the server found, and that is where the part was hidden.
     found = rest(server, f"/projects/{pid}/alignments/1")
-    six = ["x_mm", "y_mm", "z_mm", "a_deg", "b_deg", "c_deg"]
-    assert np.allclose([float(t) for t in shown], [found["correction"][k] for k in six], atol=6e-4)
+    assert np.allclose([float(t) for t in shown], [found["correction"][k] for k in SIX], atol=6e-4)
     assert np.abs(np.array([float(t) for t in shown]) - truth).max() < 0.1
 
     journey.step(page, "Report")
@@ -80,34 +96,17 @@ def test_from_the_sample_to_the_corrected_program(server, page):
         page.get_by_role("link", name="Download the corrected program").click()
     names = zipfile.ZipFile(io.BytesIO(download.value.path().read_bytes())).namelist()
     assert any(n.endswith(".src") for n in names)
+
+    # The inspection itself, rehearsed where the part really is: its maps are drawn.
+    page.get_by_role("button", name="Rehearse corrected").click()
+    assert page.locator("dialog input[name='x']").input_value() == OFFSET["x"]
+    page.locator("dialog button[type='submit']").click()
+    page.get_by_role("button", name="Assess the inspection scan").click(timeout=journey.SLOW)
+    page.get_by_role("tab", name="Amplitude").click(timeout=journey.SLOW)
+    page.locator(".drawer .heatmaplayer image").first.wait_for(timeout=journey.SLOW)
+    assert rest(server, f"/projects/{pid}/assessments/1")["after"]["within_2db"] > 0.99
     assert page.watch.complaints == []
     assert page.watch.foreign == []
-
-
-def test_the_page_goes_on_after_the_server_was_killed(server, page):
-    journey.open_sample(page, server.url, "Try the flat plate")
-    pid = re.search(r"#/p/([^/]+)", page.url)[1]
-    journey.suggest(page)
-    before = rest(server, f"/projects/{pid}/keypoints")
-    assert len(before) >= 3
-    server.kill()
-    page.locator(".people.off").wait_for(timeout=journey.SLOW)
-    server.restart()
-    page.locator(".people:not(.off)").wait_for(timeout=journey.SLOW)
-    assert rest(server, f"/projects/{pid}/keypoints") == before
-    journey.seen(page)
-    until(page, lambda: picture(page, ".stage").std() > 10, what="the part on screen again")
-    journey.plan(page)
-
-
-def test_two_browsers_see_each_others_key_points(server, page, chromium):
-    journey.open_sample(page, server.url, "Try the flat plate")
-    other = chromium.new_page(viewport={"width": 1280, "height": 800})
-    other.goto(re.sub(r"/part$", "/keypoints", page.url))
-    other.get_by_text("No key points yet").wait_for(timeout=journey.SLOW)
-    journey.suggest(page)
-    journey.chosen(other)
-    other.close()
 
 
 def test_names_are_data(server, page):
@@ -123,10 +122,14 @@ def test_names_are_data(server, page):
     page.get_by_role("link", name=evil).wait_for()
 
 
-def test_a_setup_edit_is_checked_saved_and_undone(server, page):
-    journey.open_sample(page, server.url, "Try the flat plate")
-    pid = re.search(r"#/p/([^/]+)", page.url)[1]
-    journey.step(page, "Cell")
+def opened(page, server, pid, step):
+    page.goto(f"{server.url}/#/")
+    page.goto(f"{server.url}/#/p/{pid}/{step}")
+    page.locator(".inspector h2").wait_for()
+
+
+def test_a_setup_edit_is_checked_saved_and_undone(server, page, pid):
+    opened(page, server, pid, "cell")
     field = page.locator("input[name='standoff_mm']")
     field.wait_for()
     before = rest(server, f"/projects/{pid}/setup")["standoff_mm"]
@@ -141,3 +144,82 @@ def test_a_setup_edit_is_checked_saved_and_undone(server, page):
     page.locator("input[name='standoff_mm']").fill("-3")
     page.locator("input[name='standoff_mm']").press("Tab")
     assert page.get_by_role("button", name="Save the cell").count() == 0
+
+
+def test_base_is_fitted_to_touched_points_and_saved(server, page, pid):
+    opened(page, server, pid, "cell")
+    setup = rest(server, f"/projects/{pid}/setup")
+    truth = Pose(x_mm=1080.0, y_mm=-64.0, z_mm=405.0, a_deg=11.0, b_deg=0.4, c_deg=-0.7)
+    T_base_partnom = Pose(**setup["placement"]).transform("base", "partnom")
+    cad = np.array([[0.0, 0.0, 10.0], [150.0, 0.0, 10.0], [0.0, 100.0, 10.0]])
+    touched = (truth.transform("world", "base") @ T_base_partnom).points(cad)
+    page.get_by_role("button", name="Fit to touched points").click()
+    for row, pair in enumerate(np.hstack([cad, touched])):
+        for column, value in enumerate(pair):
+            page.locator(f"input[name='pair-{row}-{column}']").fill(f"{value:.6f}")
+    page.get_by_role("button", name="Fit BASE").click()
+    page.get_by_role("button", name="Use this BASE").click()
+    page.get_by_role("button", name="Save the cell").click()
+    page.get_by_role("button", name="Continue: the surface").wait_for()
+    saved = rest(server, f"/projects/{pid}/setup")["base"]
+    assert np.allclose([saved[k] for k in SIX], truth.xyzabc(), atol=1e-5)
+    assert saved["number"] == setup["base"]["number"]
+    page.locator(".inspector footer").get_by_role("button", name="Undo").click()
+    until(page, lambda: rest(server, f"/projects/{pid}/setup") == setup, what="the undo")
+
+
+def test_a_mesh_without_a_unit_is_told_by_its_size(server, page, tmp_path):
+    made = rest(server, "/projects", "POST", {"name": "Own part"})["id"]
+    opened(page, server, made, "part")
+    file = tmp_path / "panel.stl"
+    trimesh.creation.box((0.3, 0.2, 0.01)).export(file)
+    page.locator(".drop input[type=file]").set_input_files(file)
+    page.locator(".inspector tr", has_text="300.00 × 200.00 × 10.00 mm").locator("input").check(timeout=journey.SLOW)
+    page.get_by_role("button", name="Take panel.stl in m").click()
+    page.locator(".top .part").wait_for(timeout=journey.SLOW)
+    assert rest(server, f"/projects/{made}/part")["extents_mm"] == pytest.approx([300.0, 200.0, 10.0], abs=1e-3)
+
+
+def test_why_a_job_failed_is_said(server, page, pid):
+    request = urllib.request.Request(f"{server.url}/api/v1/projects/{pid}/scans?name=wrong.csv", b"a;b\n1;2\n")
+    urllib.request.urlopen(request).close()
+    opened(page, server, pid, "alignment")
+    page.get_by_role("button", name="Align", exact=True).click()
+    page.locator(".inspector .issue.error", has_text="semicolons").wait_for(timeout=journey.SLOW)
+    # It is still there for somebody who comes later.
+    page.reload()
+    page.locator(".inspector .issue.error", has_text="semicolons").wait_for(timeout=journey.SLOW)
+
+
+def test_two_browsers_see_each_others_key_points(server, page, chromium, pid):
+    opened(page, server, pid, "keypoints")
+    other = chromium.new_page(viewport={"width": 1280, "height": 800})
+    other.goto(f"{server.url}/#/p/{pid}/keypoints")
+    journey.seen(page)
+    journey.chosen(other)
+    page.get_by_role("button", name="Clear").click()
+    other.get_by_text("No key points yet").first.wait_for(timeout=journey.SLOW)
+    page.get_by_role("button", name="Undo").click()
+    journey.chosen(other)
+    other.close()
+
+
+def test_the_page_goes_on_after_the_server_was_killed(server, page, pid):
+    opened(page, server, pid, "keypoints")
+    journey.chosen(page)
+    before = rest(server, f"/projects/{pid}/keypoints")
+    assert len(before) >= 3
+    page.get_by_role("button", name="Clear").click()
+    until(page, lambda: rest(server, f"/projects/{pid}/keypoints") == [], what="the edit")
+    server.kill()
+    page.locator(".people.off").wait_for(timeout=journey.SLOW)
+    server.restart()
+    page.locator(".people:not(.off)").wait_for(timeout=journey.SLOW)
+    journey.seen(page)
+    until(page, lambda: picture(page, ".stage").std() > 10, what="the part on screen again")
+    # What was edited before can still be undone.
+    page.get_by_role("button", name="Undo").click(timeout=journey.SLOW)
+    until(page, lambda: rest(server, f"/projects/{pid}/keypoints") == before, what="the undo")
+    # The same points again: the plan of before holds.
+    journey.step(page, "Paths")
+    page.locator(".inspector .verdict", has_text="Both paths keep to the tolerances").wait_for(timeout=journey.SLOW)
