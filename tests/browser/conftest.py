@@ -6,6 +6,7 @@ from collections.abc import Iterator
 import pytest
 from playwright.sync_api import Browser, sync_playwright
 
+from app.view.history import LIMIT, History
 from tests.browser.bare_server import Running, bare_app
 from tests.browser.eyes import ARGS
 from tests.view.memory import MemoryModel
@@ -34,14 +35,28 @@ class Bare:
         assert self.view.draw.wait()
         self.running = Running(bare_app(self.registry))
 
+    def reset(self) -> None:
+        """Start from the bare part again, and forget what was done and said."""
+        self.model.reset()
+        assert self.view.draw.wait()
+        self.view.history = History(self.model.keypoint_history(LIMIT))
+        self.model.published.clear()
+
     def stop(self) -> None:
         self.running.stop()
         self.registry.close_all()
 
 
-@pytest.fixture
-def bare() -> Iterator[Bare]:
-    """A fresh project in memory with its view."""
+@pytest.fixture(scope="module")
+def shared_bare() -> Iterator[Bare]:
+    """A project in memory with its view, one for a module."""
     made = Bare()
     yield made
     made.stop()
+
+
+@pytest.fixture
+def bare(shared_bare: Bare) -> Bare:
+    """The project as new."""
+    shared_bare.reset()
+    return shared_bare

@@ -41,7 +41,7 @@ def pid(server):
 
 @pytest.fixture(scope="module")
 def page(server, chromium):
-    context = chromium.new_context(viewport={"width": 1280, "height": 800}, accept_downloads=True)
+    context = chromium.new_context(viewport={"width": 1024, "height": 680}, accept_downloads=True)
     page = context.new_page()
     page.watch = Watch(server.url).on(page)
     yield page
@@ -193,7 +193,7 @@ def test_why_a_job_failed_is_said(server, page, pid):
 
 def test_two_browsers_see_each_others_key_points(server, page, chromium, pid):
     opened(page, server, pid, "keypoints")
-    other = chromium.new_page(viewport={"width": 1280, "height": 800})
+    other = chromium.new_page(viewport={"width": 640, "height": 420})
     other.goto(f"{server.url}/#/p/{pid}/keypoints")
     journey.seen(page)
     journey.chosen(other)

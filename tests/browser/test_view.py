@@ -24,12 +24,12 @@ def command(bare, **body):
         return json.load(answer)
 
 
-@pytest.fixture
-def page(bare, chromium):
+@pytest.fixture(scope="module")
+def page(shared_bare, chromium):
     page = chromium.new_page(viewport=SIZE)
-    page.goto(f"{bare.running.url}/view/demo/")
-    until(page, lambda: len(bare.view.browsers) == 1, what="the view's connection")
-    browser = bare.view.browsers.chosen(None)[0]
+    page.goto(f"{shared_bare.running.url}/view/demo/")
+    until(page, lambda: len(shared_bare.view.browsers) == 1, what="the view's connection")
+    browser = shared_bare.view.browsers.chosen(None)[0]
     until(page, lambda: browser.moved, what="the first framing")
     until(page, lambda: picture(page).std() > 10, what="the part on screen")
     yield page

@@ -111,6 +111,13 @@ class MemoryModel:
         self.seeds: list[Array] = []
         self.broken = False
 
+    def reset(self) -> None:
+        """Forget everything but the part."""
+        self._keys = KeyPointSet((), self._keys.version + 1)
+        self._paths, self._cloud, self._found, self.broken = {}, None, None, False
+        for topic in ("part", "keypoints", "plan", "scan", "alignment"):
+            self.tell(topic)
+
     @property
     def project_id(self) -> str:
         return self._id
