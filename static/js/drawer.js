@@ -36,7 +36,7 @@ export class Drawer {
     const token = (this.token = {});
     const place = `${this.step} ${tab.key}`;
     // Another step's chart under this tab's name would be a lie, however short.
-    if (place !== this.place) fill(this.body, h("p", { class: "nothing" }, "Loading…"));
+    if (place !== this.place) { fill(this.body, h("p", { class: "nothing" }, "Loading…")); this.body.scrollTop = 0; }
     this.place = place;
     Promise.resolve(tab.draw(this.body, () => this.token === token)).catch((error) => {
       if (this.token === token) fill(this.body, h("p", { class: "nothing" }, error.message || "This cannot be shown."));
