@@ -18,6 +18,7 @@ from tests.browser.real_server import RealServer
 # A software renderer on busy cores takes its time.
 pytestmark = [pytest.mark.browser, pytest.mark.slow, pytest.mark.timeout(900)]
 SIX = ("x_mm", "y_mm", "z_mm", "a_deg", "b_deg", "c_deg")
+TITLES = {"part": "Part", "cell": "Cell", "keypoints": "Key points", "alignment": "Alignment"}
 OFFSET = {"x": "1.1", "y": "-0.7", "z": "1.0", "a": "0.2", "b": "-0.8", "c": "0.5"}
 
 
@@ -123,9 +124,8 @@ def test_names_are_data(server, page):
 
 
 def opened(page, server, pid, step):
-    page.goto(f"{server.url}/#/")
     page.goto(f"{server.url}/#/p/{pid}/{step}")
-    page.locator(".inspector h2").wait_for()
+    page.locator(".inspector h2", has_text=TITLES[step]).wait_for()
 
 
 def test_a_setup_edit_is_checked_saved_and_undone(server, page, pid):
