@@ -21,7 +21,7 @@ def build_parser() -> argparse.ArgumentParser:
     )
     parser.add_argument("--version", action="store_true", help="print the version and exit")
     commands = parser.add_subparsers(dest="command", metavar="COMMAND")
-    for add in (_demo, _plan, _simulate, _align, _assess, _check, _reproduce, _serve):
+    for add in (_demo, _plan, _simulate, _align, _assess, _check, _calibrate, _robot, _reproduce, _serve):
         add(commands)
     return parser
 
@@ -129,6 +129,22 @@ def _assess(commands: "argparse._SubParsersAction[argparse.ArgumentParser]") -> 
 def _check(commands: "argparse._SubParsersAction[argparse.ArgumentParser]") -> None:
     sub = _command(commands, "check", "read KRL back and print what is wrong")
     sub.add_argument("files", type=Path, nargs="+", metavar="FILE", help=".src and .dat files")
+
+
+def _calibrate(commands: "argparse._SubParsersAction[argparse.ArgumentParser]") -> None:
+    sub = _command(commands, "calibrate", "tilt loss, couplant or TCP from measurements; prints a patch of setup.json")
+    sub.add_argument("kind", choices=("tilt", "couplant", "tcp"))
+    sub.add_argument("files", type=Path, nargs="+", metavar="FILE")
+    sub.add_argument("--setup", type=Path, metavar="setup.json", help="the cell as it is believed to be")
+    sub.add_argument("-o", "--output", type=Path, metavar="patch.json", help="write the patch of setup.json here")
+
+
+def _robot(commands: "argparse._SubParsersAction[argparse.ArgumentParser]") -> None:
+    sub = _command(commands, "robot", "robot, tools, bases and HOME from a controller's own backup")
+    sub.add_argument("files", type=Path, nargs="+", metavar="FILE", help="$machine.dat and $config.dat")
+    sub.add_argument(
+        "-o", "--output", type=Path, default=Path("robots"), metavar="DIR", help="folder of your robot files"
+    )
 
 
 def _reproduce(commands: "argparse._SubParsersAction[argparse.ArgumentParser]") -> None:
