@@ -25,7 +25,7 @@ PLATEAU_ALONG_MM, PLATEAU_ACROSS_MM = 12.0, 6.0
 SHARE_LIMITS = (0.02, 0.98)
 # Beams tried: from Gaussian (0) to a sharp disc (1), half to twice as wide as the set-up says.
 BLENDS = (0.0, 0.25, 0.5, 0.75, 1.0)
-WIDTHS = np.geomspace(0.5, 2.0, 25)
+WIDTHS = np.geomspace(0.5, 2.0, 61)
 SIGMAS_PER_WIDTH = 2.3548
 # An error of a share beyond this is a splash, not a shape.
 MOST_ERROR = 0.1
