@@ -1,5 +1,6 @@
 """Who may talk to the server: exact Host and Origin, for HTTP and WebSocket alike, and headers that keep browsers honest."""
 
+import asyncio
 import json
 import re
 from collections.abc import Iterable
@@ -35,6 +36,9 @@ HEADERS = {
 }
 UPLOADS = re.compile(r"^/api/v1/projects/(?:[^/]+/(?:part|scans)|import)$")
 SAFE_METHODS = {"GET", "HEAD"}
+# What is read and forgotten of a request that is refused while it still comes (bytes, s).
+DRAIN_BYTES, DRAIN_S = 64 * 2**20, 5.0
+FIRST_REFUSAL = 400
 
 
 def allowed_names(settings: ServerSettings, port: int) -> tuple[frozenset[str], frozenset[str]]:
@@ -70,7 +74,9 @@ class Guard:
                 return
             await self.app(scope, receive, send)
             return
-        sender = _with_headers(send)
+        body = _Body(receive, waits="expect" in headers)
+        sender = _with_headers(_after_body(send, body))
+        receive = body
         if issue is not None:
             await _answer(sender, 403, issue)
             return
@@ -101,6 +107,45 @@ def _refusal(scope: Scope, headers: Headers, hosts: frozenset[str], origins: fro
     opens_page = headers.get("sec-fetch-mode") == "navigate" and headers.get("sec-fetch-dest") == "document"
     is_page = not scope["path"].startswith(("/api/", "/view/"))
     return None if scope["method"] in SAFE_METHODS and opens_page and is_page else foreign
+
+
+class _Body:
+    """A request's body as it is read; `drain` reads what is left of it.
+
+    A refusal that comes while the client still sends is lost if the connection is closed on data that nobody read: the
+    network then resets it, and the client sees a broken connection in place of the reason. `waits`: the client asked
+    whether it may send at all, and sends nothing unless we read.
+    """
+
+    def __init__(self, receive: Receive, waits: bool) -> None:
+        self._receive, self._done, self._waits = receive, False, waits
+
+    async def __call__(self) -> Message:
+        message = await self._receive()
+        self._waits = False
+        self._done = message["type"] != "http.request" or not message.get("more_body", False)
+        return message
+
+    async def drain(self) -> None:
+        """Read and forget the rest, within bounds of size and time."""
+        left = DRAIN_BYTES
+        try:
+            async with asyncio.timeout(DRAIN_S):
+                while not self._done and not self._waits and left > 0:
+                    left -= len((await self()).get("body", b""))
+        except TimeoutError:
+            return
+
+
+def _after_body(send: Send, body: _Body) -> Send:
+    """Return a send that reads what is left of the request before a refusal goes out."""
+
+    async def sender(message: Message) -> None:
+        if message["type"] == "http.response.start" and message["status"] >= FIRST_REFUSAL:
+            await body.drain()
+        await send(message)
+
+    return sender
 
 
 class _Limited:

