@@ -27,8 +27,10 @@ demo: .venv/runtime.stamp
 serve: .venv/runtime.stamp
 	@$(BIN)/echobase serve
 
+# The browser tests get a process of their own: software rendering wants the machine to itself.
 test: .venv/test.stamp lint
-	$(BIN)/python -m pytest
+	$(BIN)/python -m pytest tests/browser
+	$(BIN)/python -m pytest --ignore=tests/browser
 
 lint: .venv/test.stamp
 	$(BIN)/ruff check .
