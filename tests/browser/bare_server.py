@@ -73,6 +73,8 @@ class Running:
         self.socket = socket.socket()
         self.socket.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
         self.socket.bind(("127.0.0.1", port))
+        # Listening before uvicorn runs: a browser that is quicker waits instead of being refused.
+        self.socket.listen(128)
         self.port = self.socket.getsockname()[1]
         config = uvicorn.Config(
             app, log_level="warning", ws_per_message_deflate=False, ws_max_size=2**26, timeout_graceful_shutdown=1
