@@ -69,9 +69,10 @@ def create_app(settings: ServerSettings) -> FastAPI:
             yield
         finally:
             context.store.exchange.close()
-            context.runner.stop()
-            context.views.close_all()
+            # The thinker first: the views wait for what they asked it.
             context.thinker.close()
+            context.views.close_all()
+            context.runner.stop()
             context.store.close()
 
     app = FastAPI(

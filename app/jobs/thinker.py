@@ -4,7 +4,7 @@ import os
 import signal
 import threading
 from collections.abc import Callable
-from concurrent.futures import ProcessPoolExecutor
+from concurrent.futures import CancelledError, ProcessPoolExecutor
 from concurrent.futures.process import BrokenProcessPool
 from contextlib import suppress
 from typing import Any, TypeVar
@@ -22,17 +22,23 @@ class Thinker:
     def __init__(self) -> None:
         self._lock = threading.Lock()
         self._pool: ProcessPoolExecutor | None = None
+        self._closed = False
 
     def ask(self, function: Callable[..., T], *arguments: Any) -> T:
         """Return what the function answers in the process; its issues come back as EchoBaseError."""
         with self._lock:
+            # A process begun now would outlive the server's will to stop: the interpreter waits for its answers.
+            if self._closed:
+                raise _closing()
             if self._pool is None:
                 self._pool = ProcessPoolExecutor(1, CONTEXT, begin_worker)
             pool = self._pool
         try:
             answer, issues = pool.submit(_answer, function, arguments).result()
-        except (BrokenProcessPool, RuntimeError) as error:
+        except (BrokenProcessPool, CancelledError, RuntimeError) as error:
             with self._lock:
+                if self._closed:
+                    raise _closing() from error
                 if self._pool is pool:
                     self._pool = None
             text = "the process that judges key points ended unexpectedly."
@@ -42,8 +48,9 @@ class Thinker:
         return answer
 
     def close(self) -> None:
-        """End the process."""
+        """End the process, whatever it is at; nothing is answered any more."""
         with self._lock:
+            self._closed = True
             pool, self._pool = self._pool, None
         if pool is None:
             return
@@ -54,6 +61,10 @@ class Thinker:
                 else:
                     process.kill()
         pool.shutdown(wait=False, cancel_futures=True)
+
+
+def _closing() -> EchoBaseError:
+    return fail("server-closing", "the server is being stopped.", "Ask again once it is back.")
 
 
 def _answer(function: Callable[..., Any], arguments: tuple[Any, ...]) -> tuple[Any, tuple[Issue, ...]]:

@@ -24,7 +24,8 @@ class Exchange:
     """Publishes events by topic (`project:<id>`, `job:<id>`); remembers the last few for those who were away."""
 
     def __init__(self) -> None:
-        self._lock = threading.Lock()
+        # Re-entrant: the signal that ends the server may come while its own thread is in here.
+        self._lock = threading.RLock()
         self._listeners: dict[int, tuple[str, Callable[[Event], None]]] = {}
         self._next = 0
         self._number = 0

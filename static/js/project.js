@@ -17,6 +17,7 @@ const CONCERNS = {
   project: ["project"],
 };
 const PATHS = { project: "", part: "/part", setup: "/setup", surface: "/surface", keypoints: "/keypoints", plan: "/plan", scans: "/scans", alignment: "/alignments", assessment: "/assessments", state: "/state" };
+const OPEN = new Set(["queued", "running"]);
 const NEWEST = new Set(["alignment", "assessment"]);
 const ALL = ["project", "part", "setup", "surface", "keypoints", "plan", "scans", "alignment", "assessment"];
 
@@ -46,8 +47,10 @@ export class Project {
       const before = this.data.jobs.get(data.id);
       this.data.jobs.set(data.id, data);
       this.changed("jobs");
-      if (data.state === "done" && before?.state !== "done") this.load(ALL);
-      for (const waiter of this.waiters?.get(data.id) ?? []) if (!["queued", "running"].includes(data.state)) waiter(data);
+      const over = !OPEN.has(data.state);
+      // Whoever started it: a job that failed or was cancelled changes where the project stands, too.
+      if (over && before?.state !== data.state) this.load(data.state === "done" ? ALL : []);
+      for (const waiter of this.waiters?.get(data.id) ?? []) if (over) waiter(data);
     } else if (name === "insight" || name === "people") {
       this.data[name] = data;
       this.changed(name);
@@ -58,7 +61,19 @@ export class Project {
       this.changed("view");
     } else {
       if (data.what === "deleted") this.deleted = true;
+      if (!CONCERNS[data.what]) this.meetJobs();
       this.load(CONCERNS[data.what] ?? ALL);
+    }
+  }
+
+  // A stream that begins again tells nothing of what ended meanwhile: ask which jobs run and what became of the known ones.
+  async meetJobs() {
+    let rows;
+    try { rows = await get(`${this.path}/jobs?limit=20`); } catch { return; }
+    for (const row of rows) {
+      const known = this.data.jobs.get(row.id);
+      // An answer that was under way while an event came is the older one, unless it says that the job is over.
+      if (OPEN.has(row.state) ? !known : known && OPEN.has(known.state)) this.hear("job", row);
     }
   }
 
@@ -136,7 +151,7 @@ export class Project {
       const poll = setInterval(async () => {
         try {
           const job = await get(`/jobs/${id}`);
-          if (!["queued", "running"].includes(job.state)) finish(job);
+          if (!OPEN.has(job.state)) finish(job);
         } catch (error) {
           if (error.status === 404) finish({ id, state: "failed", issues: error.issues });
         }
