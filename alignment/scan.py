@@ -16,6 +16,7 @@ class Scan:
     Ts_scan_tcp: poses of the tool *as taught* in the BASE that was active (`scan`), stack m. pose_index (n,): row of that
     stack. law (n,): from 1. tof_us (n,): two-way, NaN where the echo was lost. amplitude_pct (n,): %FSH, NaN if unknown.
     T_world_scan: the BASE that was active, in world; None = the file does not say. t_s, pass_id (n,): None if absent.
+    simulated: the file says that no transducer took it.
     """
 
     Ts_scan_tcp: Transform
@@ -29,6 +30,7 @@ class Scan:
     name: str = ""
     sha256: str = ""
     issues: tuple[Issue, ...] = field(default=())
+    simulated: bool = False
 
     def __len__(self) -> int:
         return len(self.law)
@@ -45,6 +47,7 @@ class SurfacePoints:
     name: str = ""
     sha256: str = ""
     issues: tuple[Issue, ...] = field(default=())
+    simulated: bool = False
 
     def __len__(self) -> int:
         return len(self.points_scan)

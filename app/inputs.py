@@ -4,7 +4,7 @@ import json
 from pathlib import Path
 from typing import Any
 
-from pydantic import ValidationError
+from pydantic import BaseModel, ValidationError
 
 from planner.errors import EchoBaseError, fail
 from planner.issues import Issue
@@ -57,21 +57,29 @@ def read_setup(path: Path | None) -> Setup:
     return Setup() if path is None else setup_from(read_json(path), path.name)
 
 
+def with_box(setup: Setup, six: tuple[float, ...]) -> Setup:
+    """Return the settings with the inspection surface cut to a box, X0,Y0,Z0,X1,Y1,Z1 (CAD mm), corners in any order."""
+    a, b = six[:3], six[3:]
+    low, high = ([f(x, y) for x, y in zip(a, b, strict=True)] for f in (min, max))
+    inspection = setup.inspection.model_dump(mode="json") | {"box": {"min_mm": low, "max_mm": high}}
+    return setup_from(setup.model_dump(mode="json") | {"inspection": inspection}, "--box")
+
+
 def read_keypoints(path: Path) -> list[KeyPoint]:
     """Return the key points of a file."""
     return keypoints_from(read_json(path), path.name)
 
 
-def validation_failure(error: ValidationError, where: str) -> EchoBaseError:
-    """Return a pydantic error as EchoBase's own, one issue per field, in words."""
-    return EchoBaseError(*(_field_issue(dict(e), where) for e in error.errors(include_url=False)))
+def validation_failure(error: ValidationError, where: str, model: type[BaseModel] = Setup) -> EchoBaseError:
+    """Return a pydantic error as EchoBase's own, one issue per field, in words; `model`: whose fields they are."""
+    return EchoBaseError(*(_field_issue(dict(e), where, model) for e in error.errors(include_url=False)))
 
 
-def _field_issue(error: dict[str, Any], where: str) -> Issue:
+def _field_issue(error: dict[str, Any], where: str, model: type[BaseModel]) -> Issue:
     place = ".".join(str(p) for p in error["loc"]) or "the whole file"
     kind = str(error["type"])
     if kind == "extra_forbidden":
-        known = ", ".join(_siblings(error["loc"]))
+        known = ", ".join(_siblings(error["loc"], model))
         remedy = f"Correct the name or remove it; known here: {known}." if known else "Correct the name or remove it."
         return Issue("error", "field-unknown", f"there is no setting '{place}'.", remedy, where)
     message = str(error["msg"]).removeprefix("Value error, ")
@@ -80,9 +88,9 @@ def _field_issue(error: dict[str, Any], where: str) -> Issue:
     return Issue("error", "field-invalid", f"{place}{shown}: {message[:1].lower()}{message[1:]}.", "", where)
 
 
-def _siblings(loc: tuple[Any, ...]) -> list[str]:
-    """Return the legal names beside an unknown one, by walking the schema of `Setup`."""
-    schema = Setup.model_json_schema()
+def _siblings(loc: tuple[Any, ...], model: type[BaseModel]) -> list[str]:
+    """Return the legal names beside an unknown one, by walking the schema of the model."""
+    schema = model.model_json_schema()
     node: dict[str, Any] = schema
     for step in loc[:-1]:
         child = node.get("properties", {}).get(step)

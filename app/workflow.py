@@ -9,7 +9,7 @@ from pathlib import Path
 
 from app.plan import Artifacts, Plan, load_plan, plan_artifacts
 from app.steps.align import Alignment, AlignOptions, run_align
-from app.steps.assess import AssessmentResult, run_assess
+from app.steps.assess import AssessmentResult, AssessOptions, run_assess
 from app.steps.plan import PlanRequest, run_plan
 from app.steps.simulate import SimulateOptions, run_simulate
 from planner.cad import read_part
@@ -17,9 +17,9 @@ from planner.keypoint import KeyPoint
 from planner.part import Part
 from planner.path.keypoints import suggest
 from planner.setup import Setup
+from planner.surface.choose import chosen_surface
 from planner.surface.curved import CurvedSurface, footprint_mm
 from planner.surface.inspection import InspectionSurface
-from planner.surface.select import inspection_surface
 
 Progress = Callable[[float, str], None]
 
@@ -27,6 +27,7 @@ __all__ = [
     "AlignOptions",
     "Alignment",
     "Artifacts",
+    "AssessOptions",
     "AssessmentResult",
     "Plan",
     "PlanRequest",
@@ -57,9 +58,8 @@ def open_part(source: Path, name: str, unit: str | None) -> Part:
 def choose_surface(
     part: Part, setup: Setup, seeds_part: Sequence[tuple[float, float, float]] = ()
 ) -> InspectionSurface:
-    """Return the inspection surface: flooded from the seeds (CAD, mm), or the largest, ties to the one facing +Z of base."""
-    up_part = setup.T_base_partnom.inv().directions([0.0, 0.0, 1.0])
-    return inspection_surface(part, list(seeds_part) or None, up_part)
+    """Return the inspection surface: flooded from the seeds (CAD, mm), or the largest, cut to the setup's box and paint."""
+    return chosen_surface(part, setup, list(seeds_part))
 
 
 def suggest_keypoints(
@@ -89,6 +89,8 @@ def align(folder: Path, scans: Sequence[Path], options: AlignOptions, progress: 
     return run_align(folder, scans, options, progress)
 
 
-def assess(folder: Path, scan: Path, before: Path | None = None, progress: Progress = silent) -> AssessmentResult:
-    """Judge an inspection scan against the plan, and against the one from before."""
-    return run_assess(folder, scan, before, progress)
+def assess(
+    folder: Path, scans: Sequence[Path], options: AssessOptions, progress: Progress = silent
+) -> AssessmentResult:
+    """Judge an inspection scan, in one file or more, against the plan, and against the one from before."""
+    return run_assess(folder, scans, options, progress)

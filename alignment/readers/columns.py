@@ -15,6 +15,8 @@ ANGLES = ("a_deg", "b_deg", "c_deg")
 POSE = POSITION + ANGLES
 BASE = ("base_x_mm", "base_y_mm", "base_z_mm", "base_a_deg", "base_b_deg", "base_c_deg")
 ECHO = ("law", "tof_us", "amplitude_pct")
+SIMULATED = "simulated"
+"""1 in every row of a scan that no transducer took: reports say so in large type."""
 
 REQUIRED: dict[str, tuple[str, ...]] = {
     "readings": POSE + ECHO,
@@ -23,10 +25,10 @@ REQUIRED: dict[str, tuple[str, ...]] = {
     "points": POSITION,
 }
 OPTIONAL: dict[str, tuple[str, ...]] = {
-    "readings": ("t_s", "pass", *BASE),
-    "poses": ("pass", *BASE),
-    "echoes": ("pass",),
-    "points": ("amplitude_pct", "tof_us", *BASE),
+    "readings": ("t_s", "pass", SIMULATED, *BASE),
+    "poses": ("pass", SIMULATED, *BASE),
+    "echoes": ("pass", SIMULATED),
+    "points": ("amplitude_pct", "tof_us", SIMULATED, *BASE),
 }
 
 

@@ -49,6 +49,7 @@ def merge_by_time(poses: dict[str, Any], echoes: dict[str, Any], where: str) -> 
     out = {key: echoes[key][keep] for key in ("law", "tof_us", "amplitude_pct")}
     out |= {"kind": "readings", "t_s": t_kept, "pose_index": pose_index.astype(np.int32), "pass_id": passes}
     out |= {"base": poses["base"], "issues": [*poses["issues"], *echoes["issues"], *(i.to_json() for i in issues)]}
+    out["simulated"] = any(half.get("simulated", False) for half in (poses, echoes))
     return out, stack
 
 

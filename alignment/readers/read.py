@@ -44,6 +44,7 @@ def read_scan(
             name,
             sha256,
             _issues(payload),
+            payload.get("simulated", False),
         )
     if payload["kind"] != "readings":
         other = (
@@ -89,6 +90,7 @@ def _scan(payload: dict[str, Any], Ts_scan_tcp: Transform, name: str, sha256: st
         name=name,
         sha256=sha256,
         issues=_issues(payload),
+        simulated=payload.get("simulated", False),
     )
 
 

@@ -6,7 +6,7 @@ readings: `poses (m, 6)` mm and deg, `pose_index (n,)`, `law`, `tof_us`, `amplit
 poses:    `t_s (m,)`, `poses (m, 6)`, `pass_id` or None
 echoes:   `t_s (n,)`, `law`, `tof_us`, `amplitude_pct`, `pass_id` or None
 points:   `points (n, 3)`, `amplitude_pct` or None, `tof_us` or None
-and always `base` (six numbers or None) and `issues` (list of JSON issues).
+and always `base` (six numbers or None), `issues` (list of JSON issues); `simulated` (true or false) where the format can say.
 """
 
 from collections.abc import Mapping
@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 
 from alignment.readers import checks
 from alignment.readers.arrays import Array
-from alignment.readers.columns import BASE, POSE, POSITION, Layout
+from alignment.readers.columns import BASE, POSE, POSITION, SIMULATED, Layout
 from planner.errors import fail
 
 
@@ -28,6 +28,7 @@ def payload(found: Layout, columns: Mapping[str, Any], name: str) -> dict[str, A
         raise fail("scan-empty", "the file has a header but no readings.", "Export the scan again.", name)
     issues = [issue.to_json() for issue in found.issues]
     out: dict[str, Any] = {"kind": found.kind, "base": _base(columns, name), "issues": issues}
+    out["simulated"] = SIMULATED in columns and bool(np.any(_numbers(columns[SIMULATED]) > 0.0))
     if found.kind == "points":
         points = _stack(columns, POSITION)
         keep = checks.finite_rows(points, POSITION, name, issues)

@@ -1,4 +1,4 @@
-"""Routes of setup, inspection surface and key points: what two people may edit."""
+"""Routes of setup, inspection surface, key points and record: what two people may edit."""
 
 from typing import Annotated, Any
 
@@ -9,6 +9,7 @@ from app.api.errors import documented
 from app.api.etags import IfMatch, expected, tag
 from app.api.models import Surface
 from app.inputs import keypoints_from
+from app.report.record import Record
 from app.store import inputs, projects
 from planner.keypoint import KeyPoint, KeyPointList
 from planner.setup import Setup
@@ -72,6 +73,20 @@ def put_keypoints(
     )
     tag(response, row.version)
     return points
+
+
+@router.get("/record", responses=documented(404))
+def get_record(ctx: Ctx, project_id: ProjectId, response: Response, version: Version = None) -> Record:
+    """Return what people wrote down of the inspection (`record.json`); empty fields print as blanks."""
+    return Record.model_validate(_read(ctx, project_id, "record", response, version))
+
+
+@router.put("/record", responses=documented(404, 412))
+def put_record(ctx: Ctx, project_id: ProjectId, body: Record, response: Response, if_match: IfMatch = None) -> Record:
+    """Replace the record. Reports downloaded from now on show it; nothing has to be aligned again."""
+    row = inputs.put(ctx.store, project_id, "record", body.model_dump(mode="json"), expected(if_match))
+    tag(response, row.version)
+    return body
 
 
 def _read(ctx: Context, project_id: str, kind: str, response: Response, version: int | None) -> Any:

@@ -1,8 +1,8 @@
 """What the routes take and give, with an example each. Files that DESIGN fixes (setup, key points) are not wrapped."""
 
-from typing import Annotated, Any, Literal
+from typing import Annotated, Any, Literal, Self
 
-from pydantic import AfterValidator, BaseModel, ConfigDict, Field
+from pydantic import AfterValidator, BaseModel, ConfigDict, Field, model_validator
 
 from planner.setup import Mm, Pose
 
@@ -93,6 +93,9 @@ class Rehearsal(Body):
     latency_ms: float = Field(0.0, ge=-1000.0, le=1000.0)
 
 
+Which = Annotated[int, Field(ge=1)]
+
+
 def _once(numbers: list[int] | None) -> list[int] | None:
     if numbers is not None and len(set(numbers)) != len(numbers):
         raise ValueError("a scan is named twice")
@@ -120,12 +123,32 @@ class Acceptance(Body):
 
 
 class AssessmentRequest(Body):
-    """Which inspection scan to judge."""
+    """Which inspection scan to judge. Passes may be split over several scans."""
 
     scan: int | None = Field(None, ge=1)
     """Number of the inspection scan; null: the newest."""
-    before: int | None = Field(None, ge=1)
-    """Number of the one from before the correction."""
+    scans: Annotated[list[Which] | None, AfterValidator(_once)] = Field(None, min_length=1, max_length=64)
+    """Instead of `scan`: all scans that make up the inspection."""
+    before: Which | Annotated[list[Which], AfterValidator(_once), Field(max_length=64)] | None = None
+    """Number or numbers of the one from before the correction."""
+    base: Literal["nominal", "corrected"] | None = None
+    """BASE that was active, for files that cannot say; null: as said with the upload."""
+    before_base: Literal["nominal", "corrected"] | None = None
+    """The same for the scans from before."""
+
+    @model_validator(mode="after")
+    def _one_of_both(self) -> Self:
+        if self.scan is not None and self.scans is not None:
+            raise ValueError("give scan or scans, not both")
+        return self
+
+    def numbers(self) -> list[int] | None:
+        """Return the scans of the inspection; None: the newest."""
+        return self.scans if self.scans is not None else None if self.scan is None else [self.scan]
+
+    def before_numbers(self) -> list[int]:
+        """Return the scans from before."""
+        return [self.before] if isinstance(self.before, int) else list(self.before or ())
 
 
 class Scan(Answer):

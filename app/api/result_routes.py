@@ -1,16 +1,15 @@
-"""Routes of what was made: plan, programs, alignments, their report and acceptance, assessments."""
+"""Routes of what was made: plan, programs, alignments and their acceptance, assessments."""
 
 import json
-from typing import Annotated, Any, Literal
+from typing import Any, Literal
 
-from fastapi import APIRouter, Query, Response
+from fastapi import APIRouter, Response
 from sqlalchemy.orm import Session
 
 from app.api.context import Context, Ctx, Number, ProjectId
-from app.api.downloads import attachment, disposition, zipped
+from app.api.downloads import attachment, zipped
 from app.api.errors import documented, error_body
 from app.api.models import Acceptance, AlignmentInfo, PlanInfo
-from app.security import CSP_DOCUMENT
 from app.store import projects, results
 from app.store.content import get_bytes
 from app.store.freshness import changed_since
@@ -23,7 +22,6 @@ from app.store.tables import ResultRow
 router = APIRouter(prefix="/projects/{project_id}", tags=["results"])
 Which = Literal["alignment", "inspection", "corrected"]
 ZIP: dict[int | str, dict[str, Any]] = {200: {"content": {"application/zip": {}}}}
-HTML: dict[int | str, dict[str, Any]] = {200: {"content": {"text/html": {}}}}
 
 
 @router.get("/plan", responses=documented(404))
@@ -88,25 +86,28 @@ def accept_alignment(ctx: Ctx, project_id: ProjectId, number: Number, body: Acce
     return answer
 
 
-@router.get("/alignments/{number}/report", responses=documented(404) | HTML, response_class=Response)
-def get_report(
-    ctx: Ctx,
-    project_id: ProjectId,
-    number: Number,
-    download: Annotated[bool, Query(description="As an attachment.")] = False,
-) -> Response:
-    """Return the report of an alignment: one HTML file without scripts."""
-    with ctx.store.db.read() as session:
-        project = projects.get(session, project_id)
+@router.post("/alignments/{number}/use", responses=documented(404, 409))
+def use_alignment(ctx: Ctx, project_id: ProjectId, number: Number) -> AlignmentInfo:
+    """Put an earlier alignment in force again: it becomes the newest, with the same files, proof and acceptance.
+
+    A failed or stale one cannot be. The newest one stays as it is.
+    """
+    with ctx.store.db.write() as session:
+        projects.get(session, project_id)
         row = results.get_result(session, project_id, "alignment", number)
-        content = _bytes(ctx, session, row, "correction/report.html")
-    name = f"{project.name} alignment {number}.html"
-    headers = {
-        "Content-Disposition": disposition(name, "attachment" if download else "inline"),
-        "Content-Security-Policy": CSP_DOCUMENT,
-        "Cache-Control": "no-store",
-    }
-    return Response(content, media_type="text/html; charset=utf-8", headers=headers)
+        newest = results.latest(session, project_id, "alignment")
+        if newest is not None and newest.number != number:
+            where = f"alignment {number}"
+            if row.verdict == "fail":
+                raise refuse(
+                    409, "alignment-failed", "a failed alignment cannot be used.", "Scan and align again.", where
+                )
+            if changed_since(session, row):
+                raise refuse(409, "alignment-stale", "the alignment is stale.", "Plan and align again.", where)
+            row = results.again(session, row)
+        answer = _alignment(ctx, session, row)
+    ctx.store.tell(project_id, "alignment", number=row.number)
+    return answer
 
 
 @router.get("/assessments", responses=documented(404))
@@ -133,17 +134,6 @@ def get_charts(ctx: Ctx, project_id: ProjectId, number: Number) -> dict[str, Any
     with ctx.store.db.read() as session:
         projects.get(session, project_id)
         return _json(ctx, session, results.get_result(session, project_id, "assessment", number), "charts.json")
-
-
-@router.get("/{kind}s/{number}/files", responses=documented(404) | ZIP, response_class=Response, include_in_schema=True)
-def get_files(ctx: Ctx, project_id: ProjectId, kind: Literal["alignment", "assessment"], number: Number) -> Response:
-    """Download the documents of a result as ZIP: reports, JSON, tables, maps. Programs have their own address."""
-    with ctx.store.db.read() as session:
-        project = projects.get(session, project_id)
-        row = results.get_result(session, project_id, kind, number)
-        rows = files_of(session, project_id, f"{kind}:{number}")
-        documents = {n: get_bytes(ctx.store.blobs, f.sha256) for n, f in rows.items() if not n.startswith("corrected/")}
-    return attachment(zipped(documents), f"{project.name} {row.kind} {number}.zip", "application/zip")
 
 
 def _listed(ctx: Context, project_id: str, kind: str) -> list[AlignmentInfo]:

@@ -66,10 +66,11 @@ def assess(
     response: Response,
     body: Annotated[AssessmentRequest, Body()] = AssessmentRequest(),  # noqa: B008
 ) -> Job:
-    """Judge an inspection scan against the plan, and against the one from before."""
+    """Judge an inspection scan (in one file or more) against the plan, and against the one from before."""
     with ctx.store.db.read() as session:
         projects.get(session, project_id)
-        spec = assess_spec(session, project_id, body.scan, body.before)
+        numbers, before = body.numbers(), body.before_numbers()
+        spec = assess_spec(session, project_id, numbers, before, body.base, body.before_base)
     return job_answer(ctx.runner, _submit(ctx, project_id, "assessment", spec, response))
 
 

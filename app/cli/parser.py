@@ -72,6 +72,12 @@ def _plan(commands: "argparse._SubParsersAction[argparse.ArgumentParser]") -> No
         "--keypoints", type=Path, metavar="keypoints.json", help="key points in CAD mm; default: suggested"
     )
     sub.add_argument(
+        "--box",
+        type=_numbers(6, "--box"),
+        metavar="X0,Y0,Z0,X1,Y1,Z1",
+        help="only what of the surface lies in this box is inspected, CAD mm (inspection.box of the setup)",
+    )
+    sub.add_argument(
         "--seed",
         type=_numbers(3, "--seed"),
         action="append",
@@ -117,13 +123,37 @@ def _align(commands: "argparse._SubParsersAction[argparse.ArgumentParser]") -> N
     sub.add_argument("--rigid", dest="non_rigid", action="store_false", help="correct BASE only (default)")
     sub.set_defaults(non_rigid=False)
     sub.add_argument("--base", choices=("nominal", "corrected"), help="BASE that was active, for files that cannot say")
+    _record(sub)
+
+
+def _record(sub: argparse.ArgumentParser) -> None:
+    sub.add_argument(
+        "--record",
+        type=Path,
+        metavar="record.json",
+        help="who, by which procedure, with what (docs/report.md); default: record.json in DIR",
+    )
 
 
 def _assess(commands: "argparse._SubParsersAction[argparse.ArgumentParser]") -> None:
     sub = _command(commands, "assess", "judge an uploaded inspection scan against the plan")
     sub.add_argument("directory", type=Path, metavar="DIR", help="folder written by `echobase plan`")
-    sub.add_argument("scan", type=Path, metavar="SCAN")
-    sub.add_argument("--before", type=Path, metavar="SCAN", help="the inspection scan from before the correction")
+    sub.add_argument("scans", type=Path, nargs="+", metavar="SCAN", help="an inspection scan, in one file or more")
+    sub.add_argument(
+        "--before",
+        type=Path,
+        action="append",
+        default=[],
+        metavar="SCAN",
+        help="the inspection scan from before the correction; again for each of its files",
+    )
+    sub.add_argument(
+        "--base", choices=("nominal", "corrected"), help="BASE that was active in SCAN, for files that cannot say"
+    )
+    sub.add_argument(
+        "--before-base", choices=("nominal", "corrected"), help="BASE that was active in the scan from before"
+    )
+    _record(sub)
 
 
 def _check(commands: "argparse._SubParsersAction[argparse.ArgumentParser]") -> None:

@@ -60,19 +60,27 @@ def align_spec(session: Session, pid: str, numbers: list[int] | None, options: d
     return {"files": _plan_files(session, plan) | files, "options": spec_options, "inputs": made_from}
 
 
-def assess_spec(session: Session, pid: str, number: int | None, before: int | None) -> Spec:
-    """Return the work of judging an inspection scan, against the one from before if there is one."""
+def assess_spec(
+    session: Session, pid: str, numbers: list[int] | None, before: list[int], base: str | None, before_base: str | None
+) -> Spec:
+    """Return the work of judging the scans of one inspection, against those from before if there are any."""
     plan = fresh_plan(session, pid)
-    after = scans.get_scan(session, pid, number) if number else _newest(session, pid, (None, "inspection", "corrected"))
-    earlier = [scans.get_scan(session, pid, before)] if before else []
-    files, scan_files = _scan_files(session, [after], "scans")
+    after = (
+        [scans.get_scan(session, pid, n) for n in numbers]
+        if numbers
+        else [_newest(session, pid, (None, "inspection", "corrected"))]
+    )
+    earlier = [scans.get_scan(session, pid, n) for n in before]
+    files, scan_files = _scan_files(session, after, "scans")
     more, before_files = _scan_files(session, earlier, "before")
     setup = inputs.setup_in(session, pid)
     options = {
-        "scan_files": scan_files, "before_files": before_files, "scan": after.number, "before": before,
+        "scan_files": scan_files, "before_files": before_files,
+        "scans": [s.number for s in after], "before": [s.number for s in earlier],
+        "base": base or _one_base(after), "before_base": before_base or (_one_base(earlier) if earlier else None),
         "standoff_mm": setup.standoff_mm, "loss_db": setup.tolerances.loss_db,
     }  # fmt: skip
-    made_from = {"plan": plan.sha256, "scans": [s.sha256 for s in (after, *earlier)], "version": VERSION}
+    made_from = {"plan": plan.sha256, "scans": [s.sha256 for s in (*after, *earlier)], "version": VERSION}
     more |= _correction(session, pid, plan)
     return {"files": _plan_files(session, plan) | files | more, "options": options, "inputs": made_from}
 

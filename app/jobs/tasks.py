@@ -70,7 +70,9 @@ def _assess(workflow: str, inputs: Path, outputs: Path, options: dict[str, Any],
 
     after = [inputs / name for name in options["scan_files"]]
     before = [inputs / name for name in options["before_files"]]
-    done = import_module(workflow).assess(inputs, after[0], before[0] if before else None, progress)
+    steps = import_module(workflow)
+    chosen = steps.AssessOptions(before=tuple(before), base=options["base"], before_base=options["before_base"])
+    done = steps.assess(inputs, after, chosen, progress)
     charts = assessment_charts(done.after, done.before, options["standoff_mm"], options["loss_db"])
     text = json.dumps(charts, allow_nan=False)
     write_artifacts(outputs, {**done.artifacts, "charts.json": text.encode()})

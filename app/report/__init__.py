@@ -1,1 +1,1 @@
-"""The report: one self-contained HTML file, figures as inline SVG, prints on A4."""
+"""Reports of alignments and assessments: one `Document` each, shown as HTML, PDF, JSON and CSV."""

@@ -1,161 +1,151 @@
-"""Builds `report.html` from what the alignment found."""
+"""The alignment report: what was found, how well, and what it changes, as one `Document` with its drawings."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass, field
 from importlib.metadata import version
-from pathlib import Path
 from typing import Any
 
-import jinja2
 import numpy as np
 
 from alignment.metrics import Expected
-from app.plan import Plan, part_json
-from app.report.figures import histogram_svg, map_svg
-from planner.couplant import water_speed_m_s
-from planner.frames import Array
-from planner.setup import Pose, Setup
+from app.plan import Plan
+from app.report.compare import State, comparison
+from app.report.document import Document, Heading, Signatures, Text
+from app.report.known import ScanFacts, record_lines, temperature_mm_per_c
+from app.report.package import Pages, Report
+from app.report.pictures import Deviation, Shape, deviation_maps, inspection_maps, shape_maps
+from app.report.record import Record
+from app.report.sections import correction_of, directions_of, inputs_of, keypoints_of, proof_of, verdict_of
+from app.report.sheet import Sheet, sheet_of
+from app.report.shown import number, percent, shown
+from planner.issues import Issue
+from planner.setup import Pose
 
 KEYS = ("x_mm", "y_mm", "z_mm", "a_deg", "b_deg", "c_deg")
 METHODS = {"map": "point-to-surface estimate (MAP)", "keypoints": "key-point method (Riise et al.)"}
 
 
 @dataclass(frozen=True, eq=False)
-class Deviation:
-    """Measured less expected position along the normal, of n patches at points_part (n, 3), mm; + is outside.
-
-    before_mm, after_mm (n,): against the part where the plan believed it, and where it was found.
-    """
-
-    points_part: Array
-    before_mm: Array
-    after_mm: Array
-
-
-@dataclass(frozen=True, eq=False)
 class ReportData:
     """What the report shows beside correction.json.
 
-    before, after: the inspection as the centre law sees it; None where nothing could be estimated. baseline: the
-    key-point method on the same readings (X Y Z mm, A B C deg) or None. scans: name and SHA-256 of each.
+    before, keyed, after: the inspection as the centre law sees it, uncorrected, with the key-point method and with this
+    correction; None where nothing could be estimated. baseline: the key-point method on the same readings (X Y Z mm,
+    A B C deg) or None. manifest, findings: of the corrected program. shape: of a part that sprang back.
     """
 
     correction: dict[str, Any]
     before: Expected | None
+    keyed: Expected | None
     after: Expected | None
     deviation: Deviation
     baseline: Sequence[float] | None = None
+    shape: Shape | None = None
     manifest: dict[str, Any] | None = None
-    scans: Sequence[tuple[str, str]] = field(default_factory=tuple)
+    findings: Sequence[Issue] = ()
+    scans: Sequence[ScanFacts] = field(default_factory=tuple)
+    record: Record = field(default_factory=Record)
 
 
-def report_html(plan: Plan, data: ReportData) -> bytes:
-    """Return the report, one self-contained page without scripts."""
-    environment = jinja2.Environment(
-        loader=jinja2.FileSystemLoader(Path(__file__).parent), autoescape=True, undefined=jinja2.StrictUndefined
+def alignment_report(plan: Plan, data: ReportData) -> Report:
+    """Return the report of an alignment; a failed one says why and what was measured, and has no program."""
+    content = data.correction
+    sheet = sheet_of(plan.surface)
+    pages = Pages()
+    pages.add(*verdict_of(content), *correction_of(plan, content), *directions_of(content))
+    states = _states(data)
+    figures: dict[str, Any] = {}
+    if states:
+        table, figures = comparison(states)
+        pages.add(Heading(text="Inspection, before and after"), table, Text(text=_how(data), soft=True))
+        pages.show(inspection_maps(plan, sheet, states))
+    if content["residual"]:
+        pages.add(Heading(text="Deviation of the part as scanned"), Text(text=_residual(content["residual"])))
+        pages.add(Text(text=_shown_how(sheet), soft=True))
+        pages.show(deviation_maps(sheet, data.deviation, np.array([k.xyz() for k in plan.keypoints]).reshape(-1, 3)))
+    if content["non_rigid"]:
+        pages.add(Heading(text="Shape of the part"), Text(text=_shape(content["non_rigid"])))
+        if data.shape is not None:
+            pages.show(shape_maps(sheet, data.shape))
+    pages.add(*keypoints_of(content), *proof_of(data.manifest, data.findings))
+    pages.add(*inputs_of(_named(plan, content), data.scans))
+    pages.add(Heading(text="Record"), *record_lines(plan, data.scans), Signatures())
+    document = Document(
+        title="Alignment report",
+        subject=plan.part.provenance.name,
+        facts=(" x ".join(f"{v:.1f}" for v in plan.part.extents_mm) + " mm", METHODS[content["method"]]),
+        simulated=any(s.simulated for s in data.scans),
+        version=version("echobase"),
+        blocks=tuple(pages.blocks),
+        record=data.record,
+        data={"verdict": content["verdict"], "comparison": figures, **temperatures(plan)},
     )
-    setup, content = plan.setup, data.correction
-    page = environment.get_template("template.html").render(
-        c=content,
-        part=part_json(plan.part),
-        method_text=METHODS[content["method"]],
-        bases=[
-            ("nominal BASE", setup.base.xyzabc()),
-            *_found_bases(content),
-        ],
-        temperature_um_per_c=1000.0 * temperature_mm_per_c(plan),
-        deviation=_maps(plan, data),
-        histograms=_histograms(setup, data),
-        baseline=None
-        if data.baseline is None or content["correction"] is None
-        else [
-            ("key-point method", tuple(data.baseline)),
-            ("this correction", _six(content["correction"])),
-        ],
-        proof=_proof(data.manifest),
-        inputs=[
-            ("part SHA-256", content["inputs"]["part_sha256"]),
-            ("plan SHA-256", content["inputs"]["plan_sha256"]),
-            *((f"scan {name}", sha) for name, sha in data.scans),
-            ("EchoBase", version("echobase")),
-        ],
+    return Report(document, pages.drawn)
+
+
+def temperatures(plan: Plan) -> dict[str, float]:
+    """Return what the notes on the water temperature are computed from."""
+    couplant = plan.setup.couplant
+    if couplant.sound_speed_m_s is not None:
+        return {}
+    slope = temperature_mm_per_c(plan, plan.setup.standoff_mm)
+    return {"temperature_c": couplant.temperature_c, "mm_per_c": slope, "standoff_mm": plan.setup.standoff_mm}
+
+
+def _states(data: ReportData) -> tuple[State, ...]:
+    if data.before is None or data.after is None or data.correction["correction"] is None:
+        return ()
+    own = Pose.model_validate({k: data.correction["correction"][k] for k in KEYS}).xyzabc()
+    keyed: tuple[State, ...] = ()
+    if data.keyed is not None and data.baseline is not None and data.correction["method"] != "keypoints":
+        keyed = (State("key points", "key-point method (paper)", tuple(data.baseline), data.keyed),)
+    return (State("before", "before", None, data.before), *keyed, State("after", "this correction", own, data.after))
+
+
+def _how(data: ReportData) -> str:
+    shape = (data.correction["non_rigid"] or {}).get("applied") is not None and data.shape is not None
+    text = (
+        "What the centre law meets along the whole inspection path if the part is exactly as this scan found it"
+        + (", with the shape it has sprung back to" if shape else "")
+        + ". ToF is given as one-way distance; amplitude is what the tilt leaves by the calibrated curve. Improvements are "
+        "against the state before. How far the real part may differ from the one found is said by sigma, above."
     )
-    return page.encode()
+    if data.keyed is None and data.correction["method"] != "keypoints":
+        text += " The key-point method of the paper finds no answer in these readings."
+    return text
 
 
-def temperature_mm_per_c(plan: Plan) -> float:
-    """Return how far the surface seems to move per deg C of wrong temperature at the alignment's standoff (mm)."""
-    t = plan.setup.couplant.temperature_c
-    slope = (water_speed_m_s(min(t + 0.5, 95.0)) - water_speed_m_s(max(t - 0.5, 0.0))) / water_speed_m_s(t)
-    return plan.setup.alignment_standoff_mm * slope
+def _residual(residual: dict[str, Any]) -> str:
+    return (
+        f"Residual {shown(number(residual['rms_mm']))} mm rms, 95 % within {shown(number(residual['p95_mm']))} mm, largest "
+        f"{shown(number(residual['max_mm']))} mm, of {residual['readings']} readings used."
+    )
 
 
-def _found_bases(content: dict[str, Any]) -> list[tuple[str, tuple[float, ...]]]:
-    if content["correction"] is None:
-        return []
-    corrected = f"corrected BASE [{content['base']['number']}]"
-    return [("correction in BASE", _six(content["correction"])), (corrected, _six(content["base"]))]
+def _shown_how(sheet: Sheet) -> str:
+    if sheet.unrolled:
+        return "The inspection surface is drawn unrolled; distances around are those on its mean radius."
+    return "The inspection surface is drawn as seen along its mean normal."
 
 
-def _histograms(setup: Setup, data: ReportData) -> list[tuple[str, str]]:
-    if data.before is None or data.after is None:
-        return []
-    seen = [(e.standoff_mm[e.on_part] - setup.standoff_mm, e.db[e.on_part]) for e in (data.before, data.after)]
-    tolerance, loss = setup.tolerances.standoff_mm, setup.tolerances.loss_db
+def _shape(found: dict[str, Any]) -> str:
+    text = "The poses follow the shape." if found["applied"] else f"The poses do not follow it: {found['reason']}."
+    if found.get("field_rms_mm") is None:
+        return text
+    mm = {k: shown(number(found[k])) for k in found if k.endswith("_mm") and found[k] is not None}
+    return (
+        f"{text} Beyond the rigid correction the surface stands {mm['field_rms_mm']} mm rms and at most "
+        f"{mm['field_max_mm']} mm off its CAD, with slopes up to {shown(number(found['slope_max_deg']))} deg. The scan "
+        f"determines it over {shown(percent(found['support_share']))} of the surface, there to {mm['sigma_max_mm']} mm or "
+        f"better (one s.d.); it changes over {found['length_along_mm']:.0f} mm along and {found['length_across_mm']:.0f} mm "
+        f"across. Parts of the scan left out in turn are foretold to {mm['foretold_rms_mm']} mm rms with this shape, to "
+        f"{mm['foretold_rigid_rms_mm']} mm without."
+    )
+
+
+def _named(plan: Plan, content: dict[str, Any]) -> list[tuple[str, str]]:
     return [
-        (
-            "Standoff error of the inspection, centre law",
-            histogram_svg(seen[0][0], seen[1][0], "standoff error (mm)", (-tolerance, tolerance)),
-        ),
-        (
-            "Amplitude change through tilt, centre law",
-            histogram_svg(seen[0][1], seen[1][1], "amplitude (dB)", (-loss,)),
-        ),
+        (f"part: {plan.part.provenance.name}", content["inputs"]["part_sha256"]),
+        ("plan", content["inputs"]["plan_sha256"]),
+        ("EchoBase", content["inputs"]["version"]),
     ]
-
-
-def _six(pose: dict[str, float]) -> tuple[float, ...]:
-    return Pose.model_validate({k: pose[k] for k in KEYS}).xyzabc()
-
-
-def _maps(plan: Plan, data: ReportData) -> list[tuple[str, str]]:
-    found = data.deviation
-    if not len(found.points_part):
-        return []
-    uv, frame = in_surface_axes(plan, found.points_part)
-    outline = [(loop @ frame[:, :2]) for loop in _outline(plan)]
-    wide = max(0.05, float(np.nanpercentile(np.abs(np.r_[found.before_mm, found.after_mm]), 99)))
-    fine = max(0.02, float(np.nanpercentile(np.abs(found.after_mm), 99)))
-    label = "measured - expected (mm)"
-    return [
-        ("Deviation along the normal before the correction", map_svg(uv, found.before_mm, label, wide, outline)),
-        ("The same after the correction, on a finer scale", map_svg(uv, found.after_mm, label, fine, outline)),
-    ]
-
-
-def in_surface_axes(plan: Plan, points_part: Array) -> tuple[Array, Array]:
-    """Return points (n, 2) in the surface's own axes (longest extent first), and those axes as columns (3, 3)."""
-    normal = plan.surface.mean_normal_part
-    flat = plan.surface.vertices - plan.surface.centroid_part
-    flat = flat - np.outer(flat @ normal, normal)
-    along = np.linalg.svd(flat, full_matrices=False)[2][0]
-    along = along * np.sign(along[np.argmax(np.abs(along))])
-    frame = np.stack([along, np.cross(normal, along), normal], axis=1)
-    return points_part @ frame[:, :2], frame
-
-
-def _outline(plan: Plan) -> list[Array]:
-    from planner.surface.boundary import boundary  # noqa: PLC0415 - drawn only when there is a map
-
-    return [np.vstack([curve.points, curve.points[:1]]) for curve in boundary(plan.surface)]
-
-
-def _proof(manifest: dict[str, Any] | None) -> dict[str, Any] | None:
-    if manifest is None:
-        return None
-    files = [{"name": name, **entry} for name, entry in sorted(manifest["files"].items())]
-    sentence = (
-        f"{manifest['poses']} poses in {len(files)} files, read back from the text by an independent reader: largest "
-        f"difference {manifest['largest_difference']['mm']:.5f} mm and {manifest['largest_difference']['deg']:.6f} deg."
-    )
-    return {"sentence": sentence, "files": files}

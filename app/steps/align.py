@@ -1,5 +1,6 @@
 """Steps 6 to 8 of the engineer's day: scan files to correction, corrected program and report."""
 
+import io
 import json
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
@@ -11,10 +12,14 @@ import numpy as np
 
 from alignment.estimate.align import align
 from app.plan import Artifacts, Plan, load_plan
-from app.report.build import Deviation, ReportData, report_html
+from app.report.build import Deviation, ReportData, alignment_report
+from app.report.known import ScanFacts
+from app.report.pictures import Shape
+from app.report.record import Record
 from app.steps.corrections import last_correction
 from app.steps.non_rigid import Followed, follow
-from app.steps.programs import ExportedProgram, export_path, program_name
+from app.steps.programs import ExportedProgram, export_path, findings, program_name
+from app.steps.records import record_of
 from app.steps.scans import cloud_of, read_scans
 from kuka_export.options import ProgramOptions
 from planner.errors import EchoBaseError
@@ -34,6 +39,8 @@ class AlignOptions:
     non_rigid: bool = False
     base: Literal["nominal", "corrected"] | None = None
     last_correction: Transform | None = None
+    record: Record | None = None
+    """What people know of the inspection; None: `record.json` of the folder, if there is one."""
 
     @classmethod
     def from_folder(
@@ -43,9 +50,10 @@ class AlignOptions:
         edges: bool | None = None,
         non_rigid: bool = False,
         base: Literal["nominal", "corrected"] | None = None,
+        record: Record | None = None,
     ) -> "AlignOptions":
         """Return options that remember the folder's last correction, since `align` replaces it."""
-        return cls(method, edges, non_rigid, base, last_correction(folder))
+        return cls(method, edges, non_rigid, base, last_correction(folder), record)
 
 
 @dataclass(frozen=True, eq=False)
@@ -92,9 +100,10 @@ def run_align(folder: Path, scans: Sequence[Path], options: AlignOptions, progre
     deviation = _deviation(plan, followed)
     if followed.field_npz is not None:
         artifacts["correction/field.npz"] = followed.field_npz
-    artifacts["correction/report.html"] = report_html(
-        plan, _report_data(followed, content, deviation, program, [(s.name, s.sha256) for s in read])
+    data = _report_data(
+        followed, content, deviation, program, [ScanFacts.of(s) for s in read], record_of(folder, options.record)
     )
+    artifacts |= alignment_report(plan, data).files("correction")
     if program:
         artifacts |= program.files
     progress(1.0, "aligned")
@@ -143,8 +152,24 @@ def _report_data(
     content: dict[str, Any],
     deviation: Deviation,
     program: ExportedProgram | None,
-    scans: list[tuple[str, str]],
+    scans: list[ScanFacts],
+    record: Record,
 ) -> ReportData:
-    manifest = program.manifest if program else None
-    baseline = followed.found.baseline_xyzabc
-    return ReportData(content, followed.before, followed.after, deviation, baseline, manifest, scans)
+    return ReportData(
+        correction=content,
+        before=followed.before,
+        keyed=followed.keyed,
+        after=followed.after,
+        deviation=deviation,
+        baseline=followed.found.baseline_xyzabc,
+        shape=None if followed.field_npz is None else _shape(followed.field_npz),
+        manifest=program.manifest if program else None,
+        findings=findings(program) if program else (),
+        scans=scans,
+        record=record,
+    )
+
+
+def _shape(field_npz: bytes) -> Shape:
+    with np.load(io.BytesIO(field_npz), allow_pickle=False) as arrays:
+        return Shape(arrays["nodes"], arrays["values"], arrays["sd"], arrays["supported"])

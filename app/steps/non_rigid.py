@@ -11,7 +11,6 @@ from alignment.correction import Correction
 from alignment.estimate.align import residual_of
 from alignment.estimate.verdict import limit_issues, nominal_shift, residual_issues, verdict_of
 from alignment.metrics import Expected, expected
-from alignment.metrics.figures import Prediction
 from alignment.non_rigid import Field, FieldFit, SprungSurface, fit_field
 from app.plan import Plan
 from planner.checks import check
@@ -38,7 +37,8 @@ ENOUGH_PATCHES = 0.6
 class Followed:
     """found: the correction, with the field in it if it was applied. dense, sent: inspection path and its decimation.
 
-    before, after: what the inspection sees of the part as measured. deviation_after_mm (p,): rest at `found.points_base`.
+    before, keyed, after: what the inspection sees of the part as measured: uncorrected, corrected by the key-point
+    method's answer (None where it has none), and by `found`. deviation_after_mm (p,): rest at `found.points_base`.
     field_npz: the field as an artifact, or None.
     """
 
@@ -47,6 +47,7 @@ class Followed:
     sent: ToolPath
     adapted: bool
     before: Expected | None
+    keyed: Expected | None
     after: Expected | None
     deviation_after_mm: Array
     field_npz: bytes | None
@@ -55,7 +56,7 @@ class Followed:
 def follow(plan: Plan, cloud: PointCloud, found: Correction, adapt_poses: bool) -> Followed:
     """Return what the inspection will meet, with the part's shape in it; poses follow it if `adapt_poses`."""
     if found.T_base_basecorr is None:
-        return Followed(found, plan.inspection, plan.inspection, False, None, None, found.deviation_mm, None)
+        return Followed(found, plan.inspection, plan.inspection, False, None, None, None, found.deviation_mm, None)
     T = part_from_correction(found.T_base_basecorr, plan.setup.T_base_partnom)
     fit = fit_field(cloud, plan.curved, plan.setup, T, found.directions if adapt_poses else ())
     if fit.field is None:
@@ -91,31 +92,47 @@ def _misfit_said(found: Correction, fit: FieldFit, plan: Plan) -> Correction:
 
 
 def _rigid(plan: Plan, found: Correction, surface: CurvedSurface, T: Transform, field: Field | None) -> Followed:
-    before, after = _seen(plan, surface, plan.inspection, T)
-    found = replace(found, before=_doubted(plan, before, field), after=_doubted(plan, after, field))
+    before, after = _seen(plan, surface, plan.inspection, T, field)
+    found = replace(found, before=before.summary, after=after.summary)
     npz = None if field is None else field_npz(field, plan.curved)
     sent = decimate(plan.inspection)
-    return Followed(found, plan.inspection, sent, False, before, after, found.deviation_mm, npz)
+    keyed = _keyed(plan, found, surface, T, field)
+    return Followed(found, plan.inspection, sent, False, before, keyed, after, found.deviation_mm, npz)
 
 
-def _seen(plan: Plan, surface: CurvedSurface, path: ToolPath, T_base_part: Transform) -> tuple[Expected, Expected]:
+def _seen(
+    plan: Plan, surface: CurvedSurface, path: ToolPath, T_base_part: Transform, field: Field | None
+) -> tuple[Expected, Expected]:
     setup = plan.setup
     nominal = assume_nominal(setup.T_base_partnom)
-    return expected(surface, plan.inspection, setup, T_base_part), expected(surface, path, setup, nominal)
+    before = expected(surface, plan.inspection, setup, T_base_part)
+    after = expected(surface, path, setup, nominal)
+    return _doubted(plan, before, field), _doubted(plan, after, field)
 
 
-def _doubted(plan: Plan, seen: Expected, field: Field | None) -> Prediction:
-    """Return the prediction with the field's own standard deviation in the spread of the standoff."""
+def _keyed(
+    plan: Plan, found: Correction, surface: CurvedSurface, T_base_part: Transform, field: Field | None
+) -> Expected | None:
+    """Return what the inspection sees if it runs in the BASE that the key-point method asks for."""
+    if found.baseline is None:
+        return None
+    left = Transform("base", "part", (found.baseline.inv() @ T_base_part).rigid)
+    return _doubted(plan, expected(surface, plan.inspection, plan.setup, left), field)
+
+
+def _doubted(plan: Plan, seen: Expected, field: Field | None) -> Expected:
+    """Return what is seen, with the field's own standard deviation in the spread of the standoff of its summary."""
     if field is None or field.support is None:
-        return seen.summary
+        return seen
     poses = plan.inspection.take(plan.inspection.is_data)
     doubt = field.support.sigma_mm[field.support.nearest(poses.Ts_part_contact.xyz_mm)]
     on = seen.on_part & np.isfinite(seen.distance_mm)
     if not on.any():
-        return seen.summary
+        return seen
     d, s = seen.distance_mm[on], doubt[on]
     std = float(np.hypot(seen.summary.tof_std_mm, np.sqrt(np.mean(s**2))))
-    return replace(seen.summary, tof_std_mm=std, tof_range_mm=float((d + s).max() - (d - s).min()))
+    summary = replace(seen.summary, tof_std_mm=std, tof_range_mm=float((d + s).max() - (d - s).min()))
+    return replace(seen, summary=summary)
 
 
 def _refused(found: Correction, fit: FieldFit) -> Correction:
@@ -135,7 +152,8 @@ def _adapted(plan: Plan, found: Correction, fit: FieldFit, field: Field) -> Foll
     surface = SprungSurface(plan.curved, field)
     dense = adapt(plan.inspection, plan.curved, field)
     sent = decimate(dense)
-    before, after = _seen(plan, surface, dense, T)
+    before, after = _seen(plan, surface, dense, T, field)
+    keyed = _keyed(plan, found, surface, T, field)
     residual = residual_of(fit.patches, replace(fit.rows, r=fit.rest_mm), fit.used)
     T_base_basecorr = correction(T, setup.T_base_partnom)
     explained = residual.rms_mm <= setup.tolerances.position_mm and field.lengths_mm.min() >= setup.probe.swath_mm
@@ -156,14 +174,15 @@ def _adapted(plan: Plan, found: Correction, fit: FieldFit, field: Field) -> Foll
         T_base_basecorr=T_base_basecorr,
         centroid_mm=T.points(plan.surface.centroid_part),
         residual=residual,
-        before=_doubted(plan, before, field),
-        after=_doubted(plan, after, field),
+        before=before.summary,
+        after=after.summary,
         issues=tuple(issues),
         non_rigid=figures(fit, field) | {"applied": True, "reason": None},
         points_base=fit.rows.foot_base[picked],
         deviation_mm=-fit.rows.r[picked],
     )
-    return Followed(found, dense, sent, True, before, after, -fit.rest_mm[picked], field_npz(field, plan.curved))
+    npz = field_npz(field, plan.curved)
+    return Followed(found, dense, sent, True, before, keyed, after, -fit.rest_mm[picked], npz)
 
 
 def _shape_issues(plan: Plan, fit: FieldFit, field: Field) -> list[Issue]:

@@ -4,10 +4,11 @@ import json
 import re
 from collections.abc import Sequence
 from dataclasses import dataclass
-from pathlib import Path
+from pathlib import Path, PurePosixPath
 from typing import Any, Literal
 
 from app.plan import Artifacts, Plan
+from kuka_export.check import check_files
 from kuka_export.dense import dense_csv
 from kuka_export.export import export
 from kuka_export.options import DEFAULT_OPTIONS, ProgramOptions
@@ -77,6 +78,12 @@ def export_path(
     folder = "corrected" if T_base_basecorr is not None else FOLDER[sent.kind]
     files = {f"{folder}/{file}": content for file, content in (done.files | extra).items()}
     return ExportedProgram(files, done.manifest, tuple(done.issues))
+
+
+def findings(program: ExportedProgram) -> tuple[Issue, ...]:
+    """Return what there is to say of a program's text as KRL, and of its export."""
+    files = {PurePosixPath(n).name: content for n, content in program.files.items() if n.endswith((".src", ".dat"))}
+    return (*program.issues, *check_files(files, program.manifest["controller"]))
 
 
 def read_folder(folder: Path, kind: str) -> KrlReading:

@@ -1,4 +1,4 @@
-"""Inputs of a project: part, setup, surface seeds and key points. Every version is kept; the highest is in force."""
+"""Inputs of a project: part, setup, surface seeds, key points, record. Every version is kept; the highest is in force."""
 
 import json
 from dataclasses import dataclass
@@ -7,6 +7,7 @@ from typing import Any
 from sqlalchemy import select
 from sqlalchemy.orm import Session
 
+from app.report.record import Record
 from app.store.blobs import Blob
 from app.store.content import canonical, digest_of
 from app.store.journal import note
@@ -38,7 +39,13 @@ class Input:
 
 def defaults() -> dict[str, Any]:
     """Return the content of every input that nobody gave."""
-    return {"part": None, "setup": Setup().model_dump(mode="json"), "surface": {"seeds": []}, "keypoints": []}
+    return {
+        "part": None,
+        "setup": Setup().model_dump(mode="json"),
+        "surface": {"seeds": []},
+        "keypoints": [],
+        "record": Record().model_dump(mode="json"),
+    }
 
 
 def current(session: Session, project_id: str, kind: str) -> Input:
@@ -133,6 +140,11 @@ def files_of(session: Session, project_id: str, owner: str) -> dict[str, FileRow
 def setup_in(session: Session, project_id: str) -> Setup:
     """Return the settings in force."""
     return Setup.model_validate(current(session, project_id, "setup").content)
+
+
+def record_in(session: Session, project_id: str) -> Record:
+    """Return what people wrote down of the inspection."""
+    return Record.model_validate(current(session, project_id, "record").content)
 
 
 def keypoints_in(session: Session, project_id: str) -> list[KeyPoint]:

@@ -6,6 +6,7 @@ from typing import Annotated, Any, Literal
 
 from pydantic import BaseModel, ConfigDict, Field, ValidationError
 
+from app.report.record import Record
 from app.store.content import digest_of, digest_of_files
 from app.store.names import is_relative_name, shown_file_name
 from app.store.refusal import refuse
@@ -30,7 +31,7 @@ class _ProjectPart(_Strict):
 
 
 class _InputPart(_Strict):
-    kind: Literal["part", "setup", "surface", "keypoints"]
+    kind: Literal["part", "setup", "surface", "keypoints", "record"]
     version: Count
     sha256: Sha
     content: str
@@ -124,6 +125,8 @@ def _input_digest(row: _InputPart, content: Any, files: dict[str, dict[str, str]
         return digest_of({"file": files[f"part:{row.version}"]["source"], "unit": content["unit"]})
     if row.kind == "setup":
         Setup.model_validate(content)
+    elif row.kind == "record":
+        Record.model_validate(content)
     elif row.kind == "keypoints":
         KeyPointList.validate_python(content)
     else:

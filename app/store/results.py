@@ -7,7 +7,7 @@ from sqlalchemy.orm import Session
 
 from app.store.blobs import Blob
 from app.store.content import digest_of_files
-from app.store.inputs import add_files
+from app.store.inputs import add_files, files_of
 from app.store.journal import note
 from app.store.names import clean_text, now
 from app.store.projects import get, touch
@@ -54,6 +54,17 @@ def all_results(session: Session, project_id: str, kind: str) -> list[ResultRow]
     """Return the results of a kind, oldest first."""
     of_kind = select(ResultRow).where(ResultRow.project_id == project_id, ResultRow.kind == kind)
     return list(session.scalars(of_kind.order_by(ResultRow.number)))
+
+
+def again(session: Session, row: ResultRow) -> ResultRow:
+    """Add a result once more as the newest of its kind: the same files, and what was accepted of them."""
+    files = {
+        name: Blob(file.sha256, file.size)
+        for name, file in files_of(session, row.project_id, f"{row.kind}:{row.number}").items()
+    }
+    made = add(session, row.project_id, row.kind, files, row.inputs, row.options, row.verdict, row.summary)
+    made.accepted = row.accepted
+    return made
 
 
 def accept(session: Session, row: ResultRow, name: str, reason: str) -> None:

@@ -140,7 +140,14 @@ def align(folder: Path, scans, options: AlignOptions, progress):
     return SimpleNamespace(correction=correction, artifacts=artifacts)
 
 
-def assess(folder: Path, scan: Path, before: Path | None, progress):
+@dataclass(frozen=True)
+class AssessOptions:
+    before: tuple[Path, ...] = ()
+    base: str | None = None
+    before_base: str | None = None
+
+
+def assess(folder: Path, scans, options: AssessOptions, progress):
     content = {"after": {"within_2db": 1.0}, "before": None, "improvement_pct": None}
     artifacts = {"assessment.json": json.dumps(content).encode()}
     return SimpleNamespace(content=content, artifacts=artifacts, issues=(), after=_judged(), before=None)

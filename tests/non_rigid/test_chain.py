@@ -8,7 +8,7 @@ import pytest
 from alignment.simulator import Noise, Truth, simulate, spring_back_field, true_shape, write_readings_csv
 from app.plan import load_plan
 from app.steps.align import AlignOptions, run_align
-from app.steps.assess import run_assess
+from app.steps.assess import AssessOptions, run_assess
 from app.steps.plan import PlanRequest, run_plan
 from app.steps.programs import active_base, read_folder
 from planner.frames import Transform
@@ -70,7 +70,7 @@ def test_a_twisted_part_moved_and_sprung_back(folder):
         assert done.correction["verdict"] == "pass"
         assert done.correction["non_rigid"]["applied"] is non_rigid
         inspected = scan(folder, "corrected", truth, body, "inspection.csv", 6)
-        figures[non_rigid] = run_assess(folder, inspected, None, quiet).content["after"]
+        figures[non_rigid] = run_assess(folder, [inspected], AssessOptions(), quiet).content["after"]
         predicted[non_rigid] = done.correction["prediction"]["after"]
     assert figures[True]["tof_std_mm"] <= 0.05
     assert figures[True]["tof_range_mm"] <= 0.5

@@ -6,6 +6,7 @@ from typing import Any
 from app import workflow
 from app.cli.run import DONE, FAILED, progress_printer, say, say_issues
 from app.folder import clear_programs, write_artifacts
+from app.steps.records import read_record
 from planner.errors import fail
 
 CELLS = (("x_mm", "X", 3), ("y_mm", "Y", 3), ("z_mm", "Z", 3), ("a_deg", "A", 4), ("b_deg", "B", 4), ("c_deg", "C", 4))
@@ -17,7 +18,12 @@ def run(args: argparse.Namespace) -> tuple[dict[str, Any], int]:
         if not scan.is_file():
             raise fail("file-missing", f"there is no file '{scan.name}'.", "Check the path.", str(scan))
     options = workflow.AlignOptions.from_folder(
-        args.directory, method=args.method, edges=args.edges, non_rigid=args.non_rigid, base=args.base
+        args.directory,
+        method=args.method,
+        edges=args.edges,
+        non_rigid=args.non_rigid,
+        base=args.base,
+        record=None if args.record is None else read_record(args.record),
     )
     clear_programs(args.directory, "correction", "corrected")
     result = workflow.align(args.directory, args.scans, options, progress_printer(args))

@@ -68,8 +68,7 @@ def _inspect_before_and_after(args: argparse.Namespace, folder: Path, chosen: Sa
     for seed, (path, name) in enumerate(runs, start=2):
         options = workflow.SimulateOptions(chosen.hidden_offset, seed=seed, path=path)
         workflow.simulate(folder, options, folder / "scans" / f"{name}.csv", progress_printer(args))
-    judged = workflow.assess(
-        folder, folder / "scans" / "after.csv", folder / "scans" / "before.csv", progress_printer(args)
-    )
+    compared = workflow.AssessOptions(before=(folder / "scans" / "before.csv",))
+    judged = workflow.assess(folder, [folder / "scans" / "after.csv"], compared, progress_printer(args))
     write_artifacts(folder, judged.artifacts)
     return judged.content

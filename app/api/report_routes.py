@@ -1,0 +1,95 @@
+"""Routes of reports: of an alignment or an assessment, as HTML, PDF, JSON or CSV, with what is known by now."""
+
+from typing import Annotated, Any, Literal
+
+from fastapi import APIRouter, Query, Response
+from sqlalchemy.orm import Session
+
+from app.api.context import Context, Ctx, Number, ProjectId
+from app.api.downloads import attachment, disposition, zipped
+from app.api.errors import documented
+from app.report.document import Acceptance
+from app.report.package import Report, stored
+from app.security import CSP_DOCUMENT
+from app.store import projects, results
+from app.store.content import get_bytes
+from app.store.inputs import files_of, record_in
+from app.store.refusal import not_found
+from app.store.tables import FileRow, ResultRow
+
+router = APIRouter(prefix="/projects/{project_id}", tags=["results"])
+Kind = Literal["alignment", "assessment"]
+Format = Literal["html", "pdf", "json", "csv"]
+FOLDER = {"alignment": "correction", "assessment": "assessment"}
+MEDIA = {
+    "html": "text/html; charset=utf-8",
+    "pdf": "application/pdf",
+    "json": "application/json",
+    "csv": "text/csv; charset=utf-8",
+}
+ANSWERS: dict[int | str, dict[str, Any]] = {200: {"content": {kind.split(";")[0]: {} for kind in MEDIA.values()}}}
+ZIP: dict[int | str, dict[str, Any]] = {200: {"content": {"application/zip": {}}}}
+
+
+@router.get("/{kind}s/{number}/report", responses=documented(404) | ANSWERS, response_class=Response)
+def get_report(
+    ctx: Ctx,
+    project_id: ProjectId,
+    kind: Kind,
+    number: Number,
+    format: Annotated[Format, Query(description="HTML is one file without scripts.")] = "html",
+    download: Annotated[bool, Query(description="As an attachment.")] = False,
+) -> Response:
+    """Return the report of an alignment or assessment, with the record as it is now and who accepted the result."""
+    with ctx.store.db.read() as session:
+        project = projects.get(session, project_id)
+        row = results.get_result(session, project_id, kind, number)
+        files = files_of(session, project_id, f"{kind}:{number}")
+        report = _report(ctx, session, row, files)
+    content = _as_made(ctx, files, kind, format) if report is None else getattr(report, format)()
+    name = f"{project.name} {kind} {number}.{format}"
+    headers = {
+        "Content-Disposition": disposition(name, "attachment" if download else "inline"),
+        "Cache-Control": "no-store",
+    }
+    if format == "html":
+        headers["Content-Security-Policy"] = CSP_DOCUMENT
+    return Response(content, media_type=MEDIA[format], headers=headers)
+
+
+@router.get("/{kind}s/{number}/files", responses=documented(404) | ZIP, response_class=Response)
+def get_files(ctx: Ctx, project_id: ProjectId, kind: Kind, number: Number) -> Response:
+    """Download the documents of a result as ZIP: reports, JSON, tables, maps. Programs have their own address."""
+    with ctx.store.db.read() as session:
+        project = projects.get(session, project_id)
+        row = results.get_result(session, project_id, kind, number)
+        rows = files_of(session, project_id, f"{kind}:{number}")
+        report = _report(ctx, session, row, rows)
+    documents = {n: get_bytes(ctx.store.blobs, f.sha256) for n, f in rows.items() if not n.startswith("corrected/")}
+    if report is not None:
+        documents |= report.files(FOLDER[kind])
+    return attachment(zipped(documents), f"{project.name} {kind} {number}.zip", "application/zip")
+
+
+def _report(ctx: Context, session: Session, row: ResultRow, files: dict[str, FileRow]) -> Report | None:
+    """Return the report with the record and the acceptance of now; None for a result that was made without one."""
+    folder = FOLDER[row.kind]
+    document = files.get(f"{folder}/report.document.json")
+    if document is None:
+        return None
+    start = f"{folder}/figures/"
+    drawn = {
+        name.removeprefix(start).removesuffix(".svg"): get_bytes(ctx.store.blobs, file.sha256)
+        for name, file in files.items()
+        if name.startswith(start)
+    }
+    accepted = Acceptance.model_validate(row.accepted) if row.accepted else None
+    made = stored(get_bytes(ctx.store.blobs, document.sha256), drawn)
+    return made.completed(record_in(session, row.project_id), accepted, row.created)
+
+
+def _as_made(ctx: Context, files: dict[str, FileRow], kind: str, form: str) -> bytes:
+    name = f"{FOLDER[kind]}/report.{form}"
+    if name not in files:
+        raise not_found("file", name)
+    return get_bytes(ctx.store.blobs, files[name].sha256)
