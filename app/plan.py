@@ -21,6 +21,7 @@ from planner.part import Part, Provenance
 from planner.setup import Setup
 from planner.surface.curved import CurvedSurface, footprint_mm
 from planner.surface.inspection import InspectionSurface
+from planner.surface.keepouts import PARENTS
 from planner.toolpath import ToolPath
 
 FORMAT = 1
@@ -53,6 +54,8 @@ class Plan:
 def plan_artifacts(plan: Plan) -> Artifacts:
     """Return plan.json, plan.npz, setup.json and keypoints.json."""
     arrays = {"vertices": plan.part.vertices, "faces": plan.part.faces, "part_faces": plan.surface.part_faces}
+    if PARENTS in plan.part.meta:
+        arrays[PARENTS] = plan.part.meta[PARENTS]
     for name, path in (("alignment", plan.alignment), ("inspection", plan.inspection)):
         arrays[f"{name}.Ts_part_contact"] = path.Ts_part_contact.matrix
         for f in fields(ToolPath)[2:]:
@@ -122,7 +125,8 @@ def part_json(part: Part) -> dict[str, Any]:
 def _part(data: dict[str, Any], stored: dict[str, np.ndarray]) -> Part:
     origin = Provenance(data["name"], data["sha256"], data["unit"], tuple(data["notes"]))
     chord = float("nan") if data["chord_error_mm"] is None else data["chord_error_mm"]
-    return Part(stored["vertices"], stored["faces"], origin, chord)
+    meta = {PARENTS: stored[PARENTS]} if PARENTS in stored else {}
+    return Part(stored["vertices"], stored["faces"], origin, chord, meta)
 
 
 def _path(kind: str, stored: dict[str, np.ndarray]) -> ToolPath:

@@ -5,21 +5,37 @@ Every field is optional and its default is the paper's cell. Unknown fields are 
 
 from typing import Annotated, Literal, Self
 
-from pydantic import BaseModel, ConfigDict, Field, model_validator
+from pydantic import Field, model_validator
 
 from planner.frames import Frame, Transform
+from planner.shapes import Box, Brush, KeepOut
+from planner.strict import Deg, Mm, NonNegativeMm, PositiveMm, Strict, Xyz
 
-Mm = Annotated[float, Field(ge=-1e5, le=1e5, allow_inf_nan=False)]
-Deg = Annotated[float, Field(ge=-360.0, le=360.0, allow_inf_nan=False)]
-PositiveMm = Annotated[float, Field(gt=0.0, le=1e5, allow_inf_nan=False)]
-NonNegativeMm = Annotated[float, Field(ge=0.0, le=1e5, allow_inf_nan=False)]
+__all__ = [
+    "Alignment",
+    "Base",
+    "Couplant",
+    "Deg",
+    "Dof",
+    "Fixture",
+    "Inspection",
+    "Limits",
+    "Mm",
+    "NonNegativeMm",
+    "Pose",
+    "PositiveMm",
+    "Probe",
+    "Setup",
+    "Signals",
+    "Strict",
+    "TiltLoss",
+    "Tolerances",
+    "Tool",
+]
+
 Dof = Literal["x", "y", "z", "a", "b", "c"]
-
-
-class Strict(BaseModel):
-    """Base of every settings model: frozen, and an unknown field is an error."""
-
-    model_config = ConfigDict(extra="forbid", frozen=True, use_attribute_docstrings=True, allow_inf_nan=False)
+# Fields that the page edits in the 3D view, not in the form of the cell.
+_IN_VIEW = {"x-step": "surface"}
 
 
 class Pose(Strict):
@@ -202,8 +218,12 @@ class Inspection(Strict):
 
     strategy: Literal["geodesic", "plane"] = "geodesic"
     """How passes are laid: iso-lines of geodesic distance, or parallel planes."""
+    direction: Literal["extent", "lowest_curvature", "drawn"] = "extent"
+    """What the passes run along: the longest extent, the direction in which the surface bends least, or `guide`."""
     direction_deg: Deg = 0.0
-    """Turn of the passes about the mean normal, from the longest extent of the surface (deg)."""
+    """Turn of the passes about the mean normal, from `direction` (deg)."""
+    guide: Annotated[tuple[Xyz, ...], Field(max_length=200, json_schema_extra=_IN_VIEW)] = ()
+    """Points of a line drawn on the surface (part, mm), for direction `drawn`: at least two."""
     step_mm: float | None = Field(None, gt=0.0, le=1000.0)
     """Index step between passes (mm); null: (1 - overlap) x effective swath."""
     overlap: float = Field(0.25, ge=0.0, lt=1.0)
@@ -213,6 +233,18 @@ class Inspection(Strict):
     point_spacing_mm: float = Field(2.0, gt=0.0, le=100.0)
     """Acquisition spacing along a pass (mm)."""
     scan_speed_mm_s: float = Field(100.0, gt=0.0, le=2000.0)
+    box: Annotated[Box | None, Field(json_schema_extra=_IN_VIEW)] = None
+    """Only what of the inspection surface lies inside this box (part, mm) is inspected."""
+    paint: Annotated[tuple[Brush, ...], Field(max_length=2000, json_schema_extra=_IN_VIEW)] = ()
+    """Only what of the inspection surface is painted is inspected; in order, later dabs over earlier ones."""
+    keep_outs: Annotated[tuple[KeepOut, ...], Field(max_length=500, json_schema_extra=_IN_VIEW)] = ()
+    """Regions where no data are taken: fasteners, brackets, clamps."""
+
+    @model_validator(mode="after")
+    def _drawn_needs_a_line(self) -> Self:
+        if self.direction == "drawn" and len(self.guide) < 2:
+            raise ValueError("inspection.guide needs at least two points for direction drawn")
+        return self
 
 
 class Limits(Strict):

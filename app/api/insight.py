@@ -76,7 +76,7 @@ def _surface(part: Part, workflow: str, flood: tuple[tuple[float, float, float],
     """Return the surface; the same triangles stay the same object, so that nothing behind it is built again."""
     made = import_module(workflow).choose_surface(part, setup, flood)
     kept = _KEPT.get("surface")
-    if kept is not None and kept.part is part and kept.part_faces.tobytes() == made.part_faces.tobytes():
+    if kept is not None and kept.part is made.part and kept.part_faces.tobytes() == made.part_faces.tobytes():
         return kept
     _KEPT["surface"] = made
     return made

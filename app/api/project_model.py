@@ -76,10 +76,10 @@ class StoreModel:
             points = inputs.keypoints_in(session, self._id)
         wanted = tuple(seeds) + tuple(p.xyz() for p in points)
         choose = import_module(self._store.settings.workflow).choose_surface
-        key = (id(part), setup.placement, wanted)
+        key = (id(part), setup.placement, wanted, setup.inspection.box, setup.inspection.paint, setup.probe)
         made = self._keep("flood", key, lambda: choose(part, setup, wanted))
         # The same triangles stay the same object, so that nothing behind it is built again at every key point.
-        return cast(InspectionSurface, self._keep("surface", (id(part), made.part_faces.tobytes()), lambda: made))
+        return cast(InspectionSurface, self._keep("surface", (id(made.part), made.part_faces.tobytes()), lambda: made))
 
     def keypoints(self) -> KeyPointSet:
         """Return the key points and their version."""

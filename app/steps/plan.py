@@ -12,21 +12,21 @@ from app.plan import Artifacts, Plan, plan_artifacts
 from app.steps.programs import export_path, program_name
 from planner.cad import read_part
 from planner.checks import check
+from planner.checks.regions import region_issues
 from planner.errors import EchoBaseError
-from planner.frames import Array
 from planner.issues import Issue, errors_in
 from planner.keypoint import KeyPoint
 from planner.part import Part
 from planner.path.alignment import alignment_path
 from planner.path.coverage import Coverage, coverage
 from planner.path.decimate import decimate
-from planner.path.keypoints import snap, suggest, verdicts
+from planner.path.keypoints import kept_out, snap, suggest, verdicts
 from planner.path.raster import raster
 from planner.setup import Setup
+from planner.surface.choose import chosen_surface, clip_issues
 from planner.surface.curved import CurvedSurface, footprint_mm
 from planner.surface.facing import facing_issues
 from planner.surface.inspection import InspectionSurface
-from planner.surface.select import inspection_surface
 from planner.toolpath import ToolPath
 
 Progress = Callable[[float, str], None]
@@ -56,11 +56,15 @@ def run_plan(request: PlanRequest, progress: Progress) -> tuple[Plan, Artifacts]
         part = read_part(request.source, request.name, request.unit)
     progress(0.25, "finding the inspection surface")
     up_part = setup.T_base_partnom.inv().directions([0.0, 0.0, 1.0])
-    surface = _surface(part, request, up_part)
+    surface = _surface(part, request)
     curved = CurvedSurface(surface, footprint_mm(setup.probe))
     progress(0.35, "choosing key points")
     keypoints = snap(curved, request.keypoints) if request.keypoints else suggest(curved, setup)
-    issues = [*facing_issues(surface, up_part), *verdicts(curved, keypoints, setup)]
+    refused = kept_out(curved, keypoints, setup)
+    if refused:
+        raise EchoBaseError(*refused)
+    issues = [*facing_issues(surface, up_part), *clip_issues(surface), *region_issues(curved, setup)]
+    issues += verdicts(curved, keypoints, setup)
     progress(0.5, "laying the alignment path")
     alignment = alignment_path(curved, keypoints, setup)
     progress(0.6, "laying the inspection raster")
@@ -93,14 +97,14 @@ def run_plan(request: PlanRequest, progress: Progress) -> tuple[Plan, Artifacts]
     return plan, plan_artifacts(plan) | programs
 
 
-def _surface(part: Part, request: PlanRequest, up_part: Array) -> InspectionSurface:
+def _surface(part: Part, request: PlanRequest) -> InspectionSurface:
     """Return the surface flooded from seeds and key points; an error about a key point names it by its id."""
     places = {f"seed {i}": f"seed {i}" for i in range(1, len(request.seeds_part) + 1)}
     for i, keypoint in enumerate(request.keypoints, len(request.seeds_part) + 1):
         places[f"seed {i}"] = f"key point {keypoint.id}"
     try:
         seeds = [*request.seeds_part, *(k.xyz() for k in request.keypoints)]
-        return inspection_surface(part, seeds or None, up_part)
+        return chosen_surface(part, request.setup, seeds)
     except EchoBaseError as error:
         raise EchoBaseError(*(replace(i, where=places.get(i.where, i.where)) for i in error.issues)) from error
 
@@ -140,6 +144,10 @@ def path_json(path: ToolPath, covered: Coverage) -> dict[str, Any]:
             "within_tolerance_share": covered.within_share,
             "missed_mm2": covered.missed_mm2,
             "margin_mm2": covered.margin_mm2,
+            "beside_mm2": covered.beside_mm2,
+            "beyond_mm2": covered.beyond_mm2,
+            "unexplained_mm2": covered.unexplained_mm2,
+            "kept_out_mm2": covered.kept_out_mm2,
         },
     }
 

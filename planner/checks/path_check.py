@@ -15,6 +15,7 @@ class PathCheck:
 
     tilt_deg, standoff_mm, curvature_loss_db, sagitta_mm, effective_swath_mm: what the ultrasound sees (data poses).
     clearance_mm: nozzle to part, at the pose and on the way to the next, a lower bound; wrist_clearance_mm likewise.
+    keep_out_mm: nozzle beside what must not be crossed, at the pose and on the way to the next; inf where nothing is.
     fixture_mm: two sigma of the fixture's tolerance along the normal. axes_deg (n, 6): robot axes. reachable, singular,
     jumped (n,). margin_deg: to the nearest axis limit. speed_share: axis speed to the next pose over its limit.
     status, turn: KUKA's, of the first pose. robot: name of the robot file. issues: collected, most severe first.
@@ -27,6 +28,7 @@ class PathCheck:
     effective_swath_mm: Array
     clearance_mm: Array
     wrist_clearance_mm: Array
+    keep_out_mm: Array
     fixture_mm: Array
     axes_deg: Array
     reachable: NDArray[np.bool_]
@@ -55,6 +57,7 @@ class PathCheck:
             "effective_swath_min_mm": _smallest(self.effective_swath_mm),
             "clearance_min_mm": _smallest(self.clearance_mm),
             "wrist_clearance_min_mm": _smallest(self.wrist_clearance_mm),
+            "keep_out_min_mm": _smallest(self.keep_out_mm),
             "fixture_two_sigma_mm": _largest(self.fixture_mm),
             "robot": self.robot,
             "reachable_share": float(self.reachable.mean()) if len(self.reachable) else None,

@@ -57,7 +57,8 @@ def say_seen(path: ToolPath, setup: Setup, found: Seen) -> list[Issue]:
         "effective-swath",
         f"At {{count}} data poses the outer laws stand more than {tol.tilt_deg:g} deg off their own normal; the swath"
         f" within tolerance is as narrow as {least:.1f} of {setup.probe.swath_mm:.1f} mm.",
-        "Lay the passes along the lower curvature, or choose a smaller index step.",
+        "Lay the passes so that the array stands along the lower curvature (inspection.direction_deg 90 turns them), or"
+        " leave inspection.step_mm open: the step then follows the swath.",
         missing,
     )
     return issues

@@ -37,7 +37,7 @@ def adapt(path: ToolPath, curved: CurvedSurface, field: NormalField) -> ToolPath
         raise fail(
             "adapt-field",
             "the displacement of the part is not a smooth one: it is steeper than 45 deg somewhere on the path.",
-            "Align with --rigid, or scan more of the surface.",
+            "Run the alignment as rigid, or scan more of the surface.",
             path.kind,
         )
     n = axes[:, :, 2]

@@ -5,10 +5,19 @@ import numpy as np
 from planner.errors import EchoBaseError, fail
 from planner.frames import Array
 from planner.keypoint import KeyPoint
-from planner.path.axes import ScanAxes, scan_axes
-from planner.path.crossings import PATCH_MM, PATCH_SIGMA_MM, Rim, best_crossings, edge_rows, prior_precision, rim, rows
+from planner.path.axes import ScanAxes, raster_axes
+from planner.path.crossings import (
+    PATCH_MM,
+    PATCH_SIGMA_MM,
+    Rim,
+    best_crossings,
+    edge_rows,
+    prior_precision,
+    rows,
+    usable_rim,
+)
 from planner.path.cut import tangent
-from planner.path.ends import Run, finished, overrun
+from planner.path.ends import Run, finished, outside, overrun
 from planner.path.links import with_links
 from planner.path.mesh import PathMesh
 from planner.path.order import nearest_order
@@ -20,6 +29,7 @@ from planner.path.tracks import measure, resample
 from planner.path.travel import along_track
 from planner.setup import Setup
 from planner.surface.curved import CurvedSurface
+from planner.surface.keepouts import keep_outs_of
 from planner.toolpath import ToolPath
 
 _RIM_SPACING_MM = 5.0
@@ -35,9 +45,10 @@ def alignment_path(curved: CurvedSurface, keypoints: tuple[KeyPoint, ...], setup
     pass that ends near an edge goes on to it: with `alignment.edges` across it by `edge_overrun_mm`, data on (face -1, on
     the surface's continuation), wherever the part ends there; elsewhere, and without, up to the edge margin. With
     `alignment.edges` crossings are added until the edges on all sides are crossed and all six directions can be found.
+    Passes are interrupted at keep-out regions, and edges under them are not crossed.
     Raises `EchoBaseError` where no line over the surface joins two key points.
     """
-    return with_links(passes_through(curved, keypoints, setup), curved)
+    return with_links(passes_through(curved, keypoints, setup), curved, setup)
 
 
 def passes_through(curved: CurvedSurface, keypoints: tuple[KeyPoint, ...], setup: Setup) -> ToolPath:
@@ -47,16 +58,25 @@ def passes_through(curved: CurvedSurface, keypoints: tuple[KeyPoint, ...], setup
             "keypoints-missing", "There are no key points.", "Pick at least three, or let EchoBase suggest them."
         )
     mesh = PathMesh.of(curved.surface)
-    axes = scan_axes(curved.surface, setup.inspection.direction_deg)
+    axes = raster_axes(curved, setup)
     foot = curved.closest(np.array([k.xyz() for k in keypoints]))
     on_mesh = np.einsum("nk,nkj->nj", foot.bary, mesh.vertices[mesh.faces[foot.face]])
-    edges = rim(curved.surface, _RIM_SPACING_MM)
+    edges = usable_rim(curved.surface, _RIM_SPACING_MM, setup)
+    keep = keep_outs_of(curved.surface, setup)
     runs: list[Run] = []
     for members in strokes_through(keypoints, foot.points):
         strokes = _lines(curved, mesh, on_mesh[members], foot.normals[members], axes)
-        runs += [finished(mesh, stroke, edges, setup) for stroke in strokes]
+        runs += [piece for stroke in strokes for piece in outside(mesh, finished(mesh, stroke, edges, setup), keep)]
     if setup.alignment.edges:
-        runs += _crossings(curved, mesh, runs, edges, axes, setup)
+        extra = _crossings(curved, mesh, runs, edges, axes, setup)
+        runs += [piece for run in extra for piece in outside(mesh, run, keep) if piece.over]
+    if not runs:
+        raise fail(
+            "alignment-kept-out",
+            "The keep-out regions leave nothing of the passes through the key points.",
+            "Pick key points away from them, or correct inspection.keep_outs.",
+            "keypoints",
+        )
     return _path(curved, mesh, runs, setup)
 
 

@@ -1,29 +1,89 @@
-"""Which way to scan: the long axis of a surface, whatever its tessellation."""
+"""Which way to scan: the long axis of a surface, its straightest direction, or a line drawn; whatever its tessellation."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from scipy.spatial import ConvexHull, QhullError
 
 from planner.errors import fail
 from planner.frames import Array
+from planner.path.guide import Guide, guide_through
+from planner.path.sampling import sample_equal_area
+from planner.setup import Setup
+from planner.surface.curved import CurvedSurface
 from planner.surface.inspection import InspectionSurface
 
 # Below this length of the area-mean of the unit normals a surface closes on itself (a half tube has 0.64).
 _WRAPPED = 0.25
 
 
+# A direction of lowest curvature is one only if the surface bends this much less along it than across (mean square) ...
+_STRAIGHTER = 0.9
+# ... and bends at all: mean turn (rad) over the size of the surface.
+_BENDS_RAD = 2e-3
+_SAMPLES = 5000
+
+
 @dataclass(frozen=True, eq=False)
 class ScanAxes:
-    """Right-handed axes of a raster in `part`: along the passes, across them, mean outward normal."""
+    """Right-handed axes of a raster in `part`: along the passes, across them, mean outward normal; the line drawn, if any."""
 
     along: Array
     across: Array
     normal: Array
+    guide: Guide | None = None
+
+
+def raster_axes(curved: CurvedSurface, setup: Setup) -> ScanAxes:
+    """Return the axes of the raster as `inspection.direction` asks, turned by `inspection.direction_deg`.
+
+    Raises EchoBaseError `guide-degenerate` for a line that cannot be drawn on the surface.
+    """
+    inspection = setup.inspection
+    if inspection.direction == "extent":
+        return scan_axes(curved.surface, inspection.direction_deg)
+    axes = scan_axes(curved.surface, 0.0)
+    if inspection.direction == "lowest_curvature":
+        return _turned(_straightest(curved, axes), inspection.direction_deg)
+    guide = guide_through(curved, np.array(inspection.guide), axes.normal, inspection.direction_deg)
+    across = np.cross(guide.normal, guide.along)
+    return ScanAxes(guide.along, across, guide.normal, guide)
+
+
+def _straightest(curved: CurvedSurface, axes: ScanAxes) -> ScanAxes:
+    """Return axes along the direction in which the normals turn least: the mean square turn per mm, over the area.
+
+    dn = W dp, so the mean of |W a|^2 over the area is a . M a with M the area mean of W^2; its weakest eigenvector in the
+    plane of the surface is the direction. W of a cylinder has its axis as null vector wherever it is taken, so that the
+    tessellation does not matter. A surface that bends alike in all directions, or not at all, keeps the longest extent.
+    """
+    surface = curved.surface
+    s = sample_equal_area(surface.face_areas_mm2, _SAMPLES)
+    W = curved.shape_operator(s.face, s.bary)
+    M = np.einsum("nij,njk->ik", W, W) / len(W)
+    if float(np.linalg.norm(surface.face_areas_mm2 @ surface.face_normals)) < _WRAPPED * surface.area_mm2:
+        values, vectors = np.linalg.eigh(M)
+        along = _canonical(vectors[:, 0])
+    else:
+        plane = np.stack([axes.along, axes.across], axis=1)
+        values, vectors = np.linalg.eigh(plane.T @ M @ plane)
+        along = _canonical(plane @ vectors[:, 0])
+    size = np.sqrt(surface.area_mm2)
+    if values[0] > _STRAIGHTER**2 * values[1] or np.sqrt(values[1]) * size < _BENDS_RAD:
+        return axes
+    normal = axes.normal - (axes.normal @ along) * along
+    normal /= np.linalg.norm(normal)
+    return ScanAxes(along, np.cross(normal, along), normal)
+
+
+def _turned(axes: ScanAxes, direction_deg: float) -> ScanAxes:
+    turn = np.radians(direction_deg)
+    along = np.cos(turn) * axes.along + np.sin(turn) * axes.across
+    return replace(axes, along=along, across=np.cross(axes.normal, along))
 
 
 def scan_axes(surface: InspectionSurface, direction_deg: float) -> ScanAxes:
-    """Return the axes of the raster: the longest extent, turned by `direction_deg` about the mean normal.
+    """Return the axes of the longest extent, turned by `direction_deg` about the mean normal.
 
     The longest extent is the long side of the smallest rectangle around the surface seen along its mean normal, so
     that neither the number nor the place of the triangles matters; a square keeps the part axis nearest to X. A surface
@@ -44,10 +104,8 @@ def scan_axes(surface: InspectionSurface, direction_deg: float) -> ScanAxes:
         normal = mean / np.linalg.norm(mean)
         longest = _long_side(surface.vertices, normal)
         longest = _canonical(longest)
-    turn = np.radians(direction_deg)
-    along = np.cos(turn) * longest + np.sin(turn) * np.cross(normal, longest)
-    along /= np.linalg.norm(along)
-    return ScanAxes(along, np.cross(normal, along), normal)
+    longest /= np.linalg.norm(longest)
+    return _turned(ScanAxes(longest, np.cross(normal, longest), normal), direction_deg)
 
 
 def _canonical(v: Array) -> Array:

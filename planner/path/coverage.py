@@ -9,9 +9,11 @@ from scipy.spatial import cKDTree
 from planner.frames import Array
 from planner.path.isolines import Ints
 from planner.path.mesh import PathMesh
+from planner.path.passes import LEAD_MM
 from planner.path.sampling import Samples, sample_equal_area, sample_every_face
 from planner.setup import Setup
 from planner.surface.curved import CurvedSurface
+from planner.surface.keepouts import keep_outs_of
 from planner.toolpath import ToolPath
 
 _SAMPLES = 120_000
@@ -23,8 +25,10 @@ _EPS_MM = 1e-6
 class Coverage:
     """Areas of the inspection surface, mm2: whole, swept, swept within tolerance, missed (not swept within tolerance).
 
-    swept_share, within_share: 0..1 of the whole. margin_mm2: the part of the missed area that lies in the edge margin,
-    where no pass was asked for. face_share, face_within_share (k,): the same per triangle of the surface, for drawing.
+    kept_out_mm2: what lies in keep-out regions, neither swept nor missed. swept_share, within_share: 0..1 of the rest.
+    Why of the missed area, each once: margin_mm2 lies in the edge margin, where no pass was asked for; beside_mm2 in the
+    room that passes keep from keep-outs; beyond_mm2 was swept, but by laws whose own tilt or standoff is out of tolerance.
+    face_share, face_within_share (k,): shares per triangle of the surface, for drawing.
     """
 
     area_mm2: float
@@ -34,8 +38,16 @@ class Coverage:
     within_share: float
     missed_mm2: float
     margin_mm2: float
+    beside_mm2: float
+    beyond_mm2: float
+    kept_out_mm2: float
     face_share: Array
     face_within_share: Array
+
+    @property
+    def unexplained_mm2(self) -> float:
+        """What was missed for no other reason than that no pass reaches it (mm2)."""
+        return self.missed_mm2 - self.margin_mm2 - self.beside_mm2 - self.beyond_mm2
 
     @property
     def share(self) -> float:
@@ -69,12 +81,13 @@ def coverage(curved: CurvedSurface, path: ToolPath, setup: Setup) -> Coverage:
     surface = curved.surface
     samples = sample_every_face(surface, _SAMPLES)
     points, normals = curved.evaluate(samples.face, samples.bary)
+    kept = keep_outs_of(surface, setup).inside(points)
     swept = np.zeros(len(points), dtype=bool)
     within = np.zeros(len(points), dtype=bool)
     poses = _poses(path)
     if poses is not None:
         _sweep(points, normals, poses, setup, swept, within)
-    return _summary(curved, samples, points, swept, within, setup)
+    return _summary(curved, samples, points, swept & ~kept, within & ~kept, kept, setup)
 
 
 def swept_share(curved: CurvedSurface, path: ToolPath, setup: Setup, samples: int = 30_000) -> float:
@@ -85,7 +98,8 @@ def swept_share(curved: CurvedSurface, path: ToolPath, setup: Setup, samples: in
     poses = _poses(path)
     if poses is not None:
         _sweep(points, normals, poses, setup, swept, np.zeros_like(swept))
-    return float(swept.mean())
+    free = ~keep_outs_of(curved.surface, setup).inside(points)
+    return float((swept & free).sum() / max(int(free.sum()), 1))
 
 
 def _poses(path: ToolPath) -> _Poses | None:
@@ -176,25 +190,33 @@ def _summary(
     points: Array,
     swept: NDArray[np.bool_],
     within: NDArray[np.bool_],
+    kept: NDArray[np.bool_],
     setup: Setup,
 ) -> Coverage:
     area = samples.area_mm2
-    total = float(area.sum())
+    asked = float(area[~kept].sum())
     margin = setup.inspection.edge_margin_mm
-    missed = np.flatnonzero(~within)
-    near = np.zeros(0)
-    if margin > 0.0 and len(missed):
-        near = area[missed][np.isfinite(PathMesh.of(curved.surface).boundary_distance(points[missed], margin))]
+    missed = np.flatnonzero(~within & ~kept)
+    at, keep = points[missed], keep_outs_of(curved.surface, setup)
+    edge, beside = np.zeros(len(missed), dtype=bool), np.zeros(len(missed), dtype=bool)
+    if margin > 0.0:
+        edge = np.isfinite(PathMesh.of(curved.surface).boundary_distance(at, margin))
+    if len(keep):
+        beside = ~edge & (keep.room_mm(at, LEAD_MM) < 0.0)
+    beyond = swept[missed] & ~edge & ~beside
     faces = len(curved.surface.part_faces)
     whole = np.maximum(np.bincount(samples.face, area, faces), 1e-300)
     return Coverage(
-        area_mm2=total,
+        area_mm2=float(area.sum()),
         swept_mm2=float(area[swept].sum()),
-        swept_share=float(area[swept].sum()) / total,
+        swept_share=float(area[swept].sum()) / max(asked, 1e-300),
         within_tolerance_mm2=float(area[within].sum()),
-        within_share=float(area[within].sum()) / total,
+        within_share=float(area[within].sum()) / max(asked, 1e-300),
         missed_mm2=float(area[missed].sum()),
-        margin_mm2=float(near.sum()),
+        margin_mm2=float(area[missed][edge].sum()),
+        beside_mm2=float(area[missed][beside].sum()),
+        beyond_mm2=float(area[missed][beyond].sum()),
+        kept_out_mm2=float(area[kept].sum()),
         face_share=np.bincount(samples.face, area * swept, faces) / whole,
         face_within_share=np.bincount(samples.face, area * within, faces) / whole,
     )

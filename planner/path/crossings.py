@@ -1,6 +1,6 @@
 """Edges worth crossing: where the part ends beside the surface, and what each crossing tells about the part's place."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from weakref import WeakKeyDictionary
 
 import numpy as np
@@ -8,9 +8,11 @@ from numpy.typing import NDArray
 from scipy.spatial import cKDTree
 
 from planner.frames import Array
+from planner.path.passes import LEAD_MM
 from planner.setup import Setup
 from planner.surface.boundary import EdgeKind, boundary
 from planner.surface.inspection import InspectionSurface
+from planner.surface.keepouts import keep_outs_of
 
 # What one reading of an edge, and one patch of surface, is worth (mm, one sigma); only their ratio to the fixture counts.
 EDGE_SIGMA_MM = 0.05
@@ -28,6 +30,15 @@ class Rim:
     conormals: Array
     along: Array
     open: NDArray[np.bool_]
+
+
+def usable_rim(surface: InspectionSurface, spacing_mm: float, setup: Setup) -> Rim:
+    """Return the rim as this setup may cross it: not under a keep-out, nor where the nozzle or its overrun would meet one."""
+    whole, keep = rim(surface, spacing_mm), keep_outs_of(surface, setup)
+    if not len(keep) or not len(whole.points):
+        return whole
+    free = keep.room_mm(whole.points, LEAD_MM + setup.alignment.edge_overrun_mm) >= 0.0
+    return replace(whole, open=whole.open & free)
 
 
 def rim(surface: InspectionSurface, spacing_mm: float) -> Rim:

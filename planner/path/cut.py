@@ -10,8 +10,8 @@ from planner.frames import Array
 from planner.path.isolines import Chains
 from planner.path.mesh import PathMesh
 from planner.path.sampling import sample_equal_area
-from planner.path.subdivide import Subdivision
 from planner.surface.curved import CurvedSurface
+from planner.surface.subdivide import Subdivision
 
 _SAMPLES = 20000
 

@@ -7,15 +7,20 @@ from numpy.typing import NDArray
 
 from planner.frames import Array
 from planner.path.crossings import Rim
+from planner.path.fence import Fence
 from planner.path.isolines import Chains, Ints
 from planner.path.mesh import PathMesh
 from planner.path.passes import DataRuns, contact_frames, extrapolate
 from planner.path.section import Stroke, positions
+from planner.path.tracks import measure, within
 from planner.setup import Setup
+from planner.surface.keepouts import KeepOuts
 
 EDGE_REACH_MM = 40.0
 """A pass that ends this near the edge, and no farther than a third of its line, goes on to it."""
 _OVERRUN_TURN_RAD = np.radians(10.0)
+# Between two keep-outs a pass shorter than this is not worth its approach.
+_LEAST_PIECE_MM = 6.0
 
 
 @dataclass(frozen=True, eq=False)
@@ -56,6 +61,23 @@ def finished(mesh: PathMesh, stroke: Stroke, rim: Rim, setup: Setup, only_last: 
         else:
             s1 = max(s1, inside1)
     return Run(line, s0, s1, tuple(over), ends)
+
+
+def outside(mesh: PathMesh, run: Run, keep: KeepOuts) -> list[Run]:
+    """Return what of a pass lies outside the keep-out regions, in pieces long enough to be worth one."""
+    if not len(keep) or run.s1 <= run.s0:
+        return [run]
+    fence = Fence(mesh, 0.0, keep=keep)
+    spacing = min(_LEAST_PIECE_MM, fence.finest_mm) / 2.0
+    zero = np.zeros(1, dtype=np.int64)
+    lengths = measure(mesh, run.line)
+    _, low, high, _ = within(lengths, zero, np.array([run.s0]), np.array([run.s1]), spacing, fence)
+    out = []
+    for s0, s1 in zip(low.tolist(), high.tolist(), strict=True):
+        over = tuple(end for end in run.over if (s0 <= run.s0 + 1e-6 if end == 0 else s1 >= run.s1 - 1e-6))
+        if s1 - s0 >= _LEAST_PIECE_MM:
+            out.append(Run(run.line, s0, s1, over, run.ends))
+    return out
 
 
 def _is_open(rim: Rim, end: Array) -> bool:

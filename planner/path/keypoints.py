@@ -10,8 +10,9 @@ from planner.path.suggest import suggest
 from planner.setup import Setup
 from planner.surface.closest import Foot
 from planner.surface.curved import CurvedSurface
+from planner.surface.keepouts import keep_outs_of
 
-__all__ = ["snap", "suggest", "verdicts"]
+__all__ = ["kept_out", "snap", "suggest", "verdicts"]
 
 SNAP_MM = 2.0
 _SAME_MM = 0.5
@@ -70,7 +71,7 @@ def verdicts(curved: CurvedSurface, keypoints: tuple[KeyPoint, ...], setup: Setu
     bend = np.abs(np.linalg.eigvalsh(curved.shape_operator(foot.face, foot.bary))).max(axis=1)
     offset = bend * radius**2 / 4.0
     turned = np.cos(np.minimum(bend * radius, np.pi)) < setup.alignment.min_normal_dot
-    out: list[Issue] = []
+    out: list[Issue] = kept_out(curved, keypoints, setup)
     for i, k in enumerate(keypoints):
         where = f"keypoints: {k.id}"
         if away[i] > SNAP_MM:
@@ -107,6 +108,29 @@ def verdicts(curved: CurvedSurface, keypoints: tuple[KeyPoint, ...], setup: Setu
             )
         out += _too_close(keypoints, foot, i, radius)
     return _gathered(out) + _spread(foot)
+
+
+def kept_out(curved: CurvedSurface, keypoints: tuple[KeyPoint, ...], setup: Setup) -> list[Issue]:
+    """Return an error for every key point inside a keep-out region or its margin: no data are taken there."""
+    keep = keep_outs_of(curved.surface, setup)
+    if not len(keep) or not keypoints:
+        return []
+    room = keep.each_room_mm(_feet(curved, keypoints).points)
+    nearest = room.argmin(axis=0)
+    return [
+        Issue(
+            "error",
+            "keypoint-kept-out",
+            f"Key point {k.id} lies {'in' if gap < 0.0 else 'within the margin of'} the keep-out region "
+            f"'{keep.label(int(nearest[i]))}': no data are taken there.",
+            f"Move it by {-room[nearest[i], i]:.1f} mm or more, or correct inspection.keep_outs.",
+            f"keypoints: {k.id}",
+        )
+        for i, (k, gap) in enumerate(
+            zip(keypoints, keep.gaps_mm(_feet(curved, keypoints).points).min(axis=0), strict=True)
+        )
+        if room[nearest[i], i] < 0.0
+    ]
 
 
 def _gathered(issues: list[Issue]) -> list[Issue]:

@@ -9,9 +9,12 @@ import numpy as np
 
 from planner.frames import Array, Transform
 from planner.part import Part
+from planner.path.detour import Detours
 from planner.path.isolines import Ints
 from planner.path.passes import CLEARANCE_MM
+from planner.setup import Setup
 from planner.surface.curved import CurvedSurface
+from planner.surface.keepouts import keep_outs_of
 from planner.toolpath import Role, ToolPath
 
 _STEP_MM = 25.0
@@ -54,12 +57,12 @@ class _Body:
 _KNOWN: WeakKeyDictionary[Part, _Body] = WeakKeyDictionary()
 
 
-def with_links(path: ToolPath, curved: CurvedSurface) -> ToolPath:
+def with_links(path: ToolPath, curved: CurvedSurface, setup: Setup) -> ToolPath:
     """Return the path with LINK poses where the straight way from one pass to the next would come near the part.
 
     Short hops between poses that look the same way need none. Elsewhere the straight way is tested in steps; if it comes
     nearer than approach and retract stand, it is lifted off the nearest points of the part, and if even that passes
-    through it, led round the part on a sphere.
+    through it, led round the part on a sphere. A way over a keep-out that must not be crossed is led beside it.
     """
     leave = np.flatnonzero(path.role == Role.RETRACT)[:-1]
     if not len(leave):
@@ -69,7 +72,9 @@ def with_links(path: ToolPath, curved: CurvedSurface) -> ToolPath:
     p, z = tcp.xyz_mm, -tcp.rotation_matrix[:, :, 2]
     gap = np.linalg.norm(p[1::2] - p[0::2], axis=1)
     alike = np.einsum("ij,ij->i", z[0::2], z[1::2]) > np.cos(np.radians(_ALIKE_DEG))
-    doubtful = np.flatnonzero(~(alike & (gap < CLEARANCE_MM)))
+    near = alike & (gap < CLEARANCE_MM)
+    detours = Detours.of(keep_outs_of(curved.surface, setup).columns, setup)
+    doubtful = np.flatnonzero(~near | detours.crossed(p[0::2], p[1::2], z[0::2], z[1::2]))
     if not len(doubtful):
         return path
     body = _Body.of(curved.surface.part)
@@ -77,7 +82,10 @@ def with_links(path: ToolPath, curved: CurvedSurface) -> ToolPath:
     points, ups, after = [], [], []
     for i in doubtful:
         a, b = p[2 * i], p[2 * i + 1]
-        way = _way(body, a, b, z[2 * i], z[2 * i + 1], need)
+        way = np.zeros((0, 3)) if near[i] else _way(body, a, b, z[2 * i], z[2 * i + 1], need)
+        up = np.concatenate([z[2 * i][None], _upwards(body, way), z[2 * i + 1][None]])
+        if detours.blocks(np.concatenate([a[None], way, b[None]]), up):
+            way = _beside(body, detours, a, b, z[2 * i], z[2 * i + 1], need)
         if len(way):
             points.append(way)
             ups.append(_upwards(body, way))
@@ -85,6 +93,25 @@ def with_links(path: ToolPath, curved: CurvedSurface) -> ToolPath:
     if not points:
         return path
     return _insert(path, np.concatenate(points), np.concatenate(ups), np.concatenate(after))
+
+
+def _beside(body: _Body, detours: Detours, a: Array, b: Array, za: Array, zb: Array, need: float) -> Array:
+    """Return the points to travel through from a to b beside what must not be crossed; clear of the part as well."""
+
+    def lifted(points: Array) -> Array:
+        for _ in range(_LIFTS):
+            height, near, out = body.height(points)
+            short = height < need
+            points = np.where(short[:, None], near + out * need * 1.05, points)
+        return points
+
+    turns = detours.way(a, b, lifted)
+    stops = np.concatenate([a[None], turns, b[None]])
+    up = np.concatenate([za[None], _upwards(body, turns), zb[None]])
+    legs = []
+    for k in range(len(stops) - 1):
+        legs += [_way(body, stops[k], stops[k + 1], up[k], up[k + 1], need), stops[k + 1][None]]
+    return np.concatenate(legs[:-1]) if legs else turns
 
 
 def _between(a: Array, b: Array, step: float) -> Array:
@@ -139,7 +166,7 @@ def _exit(q: Array, z: Array, radius: float) -> Array:
 
 
 def _upwards(body: _Body, way: Array) -> Array:
-    return body.height(way)[2]
+    return body.height(way)[2] if len(way) else np.zeros((0, 3))
 
 
 def _insert(path: ToolPath, points: Array, ups: Array, after: Ints) -> ToolPath:

@@ -6,8 +6,9 @@ from scipy.ndimage import maximum_filter1d
 
 from planner.errors import fail
 from planner.frames import Array
-from planner.path.axes import ScanAxes, scan_axes
+from planner.path.axes import ScanAxes, raster_axes
 from planner.path.cut import tangent
+from planner.path.fence import raster_fence
 from planner.path.links import with_links
 from planner.path.mesh import PathMesh
 from planner.path.order import nearest_order
@@ -29,8 +30,8 @@ _SHARP_DEG = 30.0
 def raster(curved: CurvedSurface, setup: Setup) -> ToolPath:
     """Return the dense inspection path (kind `inspection`) over the surface.
 
-    `plane`: sections by parallel planes along `direction_deg` from the longest extent; `geodesic`: lines of equal
-    distance, measured on the surface, from the longest central section. Both keep the step on the surface, go forth and
+    `plane`: sections by parallel planes along `inspection.direction`; `geodesic`: lines of equal distance, measured on the
+    surface, from the longest central section along it, or from the line drawn. Both keep the step on the surface, go forth and
     back, hold the array's heading in space, and split at holes and sharp turns.
 
     The track of the TCP keeps `edge_margin_mm` from the edge at the ends of each pass; across, the swath of the
@@ -39,15 +40,11 @@ def raster(curved: CurvedSurface, setup: Setup) -> ToolPath:
     Raises `EchoBaseError` if the surface leaves no room or the raster would be unreasonably dense.
     """
     surface, inspection = curved.surface, setup.inspection
-    axes = scan_axes(surface, inspection.direction_deg)
+    axes = raster_axes(curved, setup)
     mesh = PathMesh.of(surface)
     cut = (plane_cut if inspection.strategy == "plane" else geodesic_cut)(curved, mesh, axes, setup)
     spacing = acquisition_spacing_mm(setup)
-    # Where a track comes nearer to an edge than this, its neighbour covers everything up to the margin.
-    swath = setup.probe.swath_mm
-    step = inspection.step_mm if inspection.step_mm is not None else (1.0 - inspection.overlap) * swath
-    floor = inspection.edge_margin_mm - max(step - swath / 2.0, 0.0)
-    track = tracks(cut.mesh, cut.chains, spacing, inspection.edge_margin_mm, floor)
+    track = tracks(cut.mesh, cut.chains, spacing, raster_fence(cut.mesh, surface, setup))
     if len(track.run) > MOST_POSES:
         raise fail(
             "raster-too-dense",
@@ -79,7 +76,7 @@ def raster(curved: CurvedSurface, setup: Setup) -> ToolPath:
         headings(points, normals, travel, track.run, across),
     )
     path = assemble(data, "inspection", setup.standoff_mm, spacing)
-    return with_links(path, curved)
+    return with_links(path, curved, setup)
 
 
 def acquisition_spacing_mm(setup: Setup) -> float:

@@ -15,10 +15,10 @@ from planner.path.isolines import isolines, neighbours
 from planner.path.layout import levels, step_field
 from planner.path.manifold import unglued
 from planner.path.mesh import PathMesh
-from planner.path.subdivide import Subdivision, split_long_edges
 from planner.path.swath import effective_half_mm, step_mm
 from planner.setup import Setup
 from planner.surface.curved import CurvedSurface
+from planner.surface.subdivide import Subdivision, split_long_edges
 
 _GUIDES = 15
 # Triangles of the field are no longer than this share of the surface's size: fronts that bend need places to bend at.
@@ -69,16 +69,27 @@ _KNOWN: WeakKeyDictionary[PathMesh, _Guided] = WeakKeyDictionary()
 
 def _guided(mesh: PathMesh, axes: ScanAxes) -> _Guided:
     known = _KNOWN.get(mesh)
-    if known is not None and (known.axes.along == axes.along).all() and (known.axes.across == axes.across).all():
+    if known is not None and _alike(known.axes, axes):
         return known
     size = float(np.linalg.norm(np.ptp(mesh.vertices[mesh.faces].reshape(-1, 3), axis=0)))
     closed = fill_holes(unglued(mesh))
     whole = split_long_edges(closed.vertices, closed.faces, size * _FINENESS)
-    height = whole.vertices @ axes.across
-    d = guide_distance(whole.vertices, whole.faces, height - _guide_offset(whole, height))
+    if axes.guide is not None:
+        height = axes.guide.height_mm(whole.vertices)
+    else:
+        height = whole.vertices @ axes.across
+        height = height - _guide_offset(whole, height)
+    d = guide_distance(whole.vertices, whole.faces, height)
     fine = whole.only(whole.parent < len(mesh.faces))
     made = _KNOWN[mesh] = _Guided(axes, fine, PathMesh(fine.vertices, fine.faces), d)
     return made
+
+
+def _alike(a: ScanAxes, b: ScanAxes) -> bool:
+    same = bool((a.along == b.along).all() and (a.across == b.across).all())
+    if a.guide is None or b.guide is None:
+        return same and a.guide is b.guide
+    return same and np.array_equal(a.guide.line, b.guide.line) and np.array_equal(a.guide.origin, b.guide.origin)
 
 
 def _guide_offset(whole: Subdivision, height: Array) -> float:

@@ -8,7 +8,7 @@ from planner.errors import fail
 from planner.frames import Array
 from planner.keypoint import KeyPoint
 from planner.path.alignment import passes_through
-from planner.path.axes import ScanAxes, scan_axes
+from planner.path.axes import ScanAxes, raster_axes
 from planner.path.coverage import swept_share
 from planner.path.crossings import PATCH_MM, PATCH_SIGMA_MM, prior_precision, rows
 from planner.path.ends import EDGE_REACH_MM
@@ -18,6 +18,7 @@ from planner.path.section import Stroke, positions, whole_lines
 from planner.path.tour import strip_id
 from planner.setup import Setup
 from planner.surface.curved import CurvedSurface
+from planner.surface.keepouts import keep_outs_of
 
 _SHARES = (0.35, 0.5, 0.65)
 _CLOSE_ENOUGH = 0.01
@@ -49,7 +50,7 @@ def suggest(curved: CurvedSurface, setup: Setup, seed: int = 0) -> tuple[KeyPoin
     the strips a little. Ids say strip and place (`S3.1`); `alignment_path` relies on them.
     """
     mesh = PathMesh.of(curved.surface)
-    axes = scan_axes(curved.surface, setup.inspection.direction_deg)
+    axes = raster_axes(curved, setup)
     asked = setup.alignment.coverage
     length = asked * curved.surface.area_mm2 / setup.probe.swath_mm
     shift = float(np.random.default_rng(seed).uniform(-0.2, 0.2)) if seed else 0.0
@@ -166,7 +167,8 @@ def _keypoints(curved: CurvedSurface, mesh: PathMesh, strips: list[_Strip], setu
 
 
 def _places(curved: CurvedSurface, mesh: PathMesh, strip: _Strip, count: int, setup: Setup) -> Array:
-    """Return where on the strip its key points stand: off the edges by their search radius, off curved places."""
+    """Return where on the strip its key points stand: off the edges by their search radius, off curved places, and never
+    in a keep-out."""
     radius = setup.alignment.search_radius_mm
     span = strip.s1 - strip.s0
     off = min(strip.inset * radius, max(0.45 * span, span - _APART_MM), 0.9 * EDGE_REACH_MM)
@@ -174,19 +176,26 @@ def _places(curved: CurvedSurface, mesh: PathMesh, strip: _Strip, count: int, se
     b = strip.s1 - (off if strip.free[1] else 0.0)
     count = int(np.clip(1 + (b - a) // (2.0 * radius), 2, count))
     want = np.linspace(a, b, count)
-    if b - a < 4.0 * radius:
+    keep = keep_outs_of(curved.surface, setup)
+    if b - a < 4.0 * radius and not len(keep):
         return want
     fine = np.linspace(a, b, 81)
     on_line, bary, face = positions(mesh, strip.stroke.line, fine)
-    clear = ~(mesh.boundary_distance(on_line, radius) < radius)
+    room = keep.room_mm(on_line)
+    clear = ~(mesh.boundary_distance(on_line, radius) < radius) & (room >= radius)
     bend = np.abs(np.linalg.eigvalsh(curved.shape_operator(face.astype(np.int32), bary))).max(axis=1)
     fixed = (not strip.free[0], not strip.free[1])
+    kept = np.zeros(count, dtype=bool)
     for i in range(count):
-        if (i == 0 and fixed[0]) or (i == count - 1 and fixed[1]):
-            continue
         near = np.flatnonzero(np.abs(fine - want[i]) <= 0.15 * (b - a))
+        here = near[np.abs(fine[near] - want[i]).argmin()]
+        stays = (i == 0 and fixed[0]) or (i == count - 1 and fixed[1]) or b - a < 4.0 * radius
+        if stays and room[here] >= 0.0:
+            continue
         good = near[(bend[near] * radius**2 / 4.0 <= setup.tolerances.position_mm) & clear[near]]
-        pick = good[np.abs(fine[good] - want[i]).argmin()] if len(good) else near[(bend[near] + ~clear[near]).argmin()]
+        worse = bend + ~clear + 1e6 * (room < 0.0)
+        pick = good[np.abs(fine[good] - want[i]).argmin()] if len(good) else near[worse[near].argmin()]
+        kept[i] = room[pick] < 0.0
         if not (len(good) and abs(fine[pick] - want[i]) < (b - a) / 80.0):
             want[i] = fine[pick]
-    return np.asarray(want)
+    return np.asarray(want[~kept])

@@ -6,6 +6,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from planner.frames import Array
+from planner.path.fence import Fence
 from planner.path.isolines import Chains, Ints
 from planner.path.mesh import PathMesh
 
@@ -61,18 +62,18 @@ class Lengths:
     total: Array
 
 
-def tracks(mesh: PathMesh, chains: Chains, spacing_mm: float, margin_mm: float, floor_mm: float = 0.0) -> Tracks:
-    """Resample chains at equal spacing (at most `spacing_mm`), kept away from the boundary of the surface.
+def tracks(mesh: PathMesh, chains: Chains, spacing_mm: float, fence: Fence) -> Tracks:
+    """Resample chains at equal spacing (at most `spacing_mm`), kept inside a fence.
 
-    Each pass begins and ends at the first place that is `margin_mm` away from the boundary. Between its ends a track may
-    come nearer, as one that passes a hole sideways does, but no nearer than `floor_mm`: there it is cut in two. Loops that
-    are nowhere cut keep their whole length and end where they began.
+    Each pass begins and ends at the first place where the fence lets it. Between its ends a track may come nearer, as one
+    that passes a hole sideways does, but where the fence forbids it is cut in two. Loops that are nowhere cut keep
+    their whole length and end where they began.
     """
     lengths = measure(mesh, chains)
     which = np.arange(len(chains.level))
     s0, s1, closed = np.zeros(len(which)), lengths.total.copy(), chains.closed
-    if margin_mm > 0.0 and len(mesh.boundary_edges):
-        which, s0, s1, closed = _within_margin(mesh, lengths, min(spacing_mm, margin_mm / 2.0), margin_mm, floor_mm)
+    if not fence.is_open:
+        which, s0, s1, closed = within(lengths, which, s0, s1, min(spacing_mm, fence.finest_mm / 2.0), fence)
     keep = s1 - s0 >= spacing_mm * (1.0 - 1e-9)
     return resample(lengths, which[keep], s0[keep], s1[keep], closed[keep], spacing_mm)
 
@@ -112,19 +113,20 @@ def resample(
     return Tracks(chains.face[seg].astype(np.int32), bary, points, run.astype(np.int64), chains.level[which], closed)
 
 
-def _within_margin(
-    mesh: PathMesh, lengths: Lengths, spacing: float, margin: float, floor: float
+def within(
+    lengths: Lengths, which: Ints, start: Array, stop: Array, spacing: float, fence: Fence
 ) -> tuple[Ints, Array, Array, NDArray[np.bool_]]:
-    """Return the intervals of chains to travel: chain, from, to (mm), and whether it is a whole loop."""
+    """Return what of the intervals start..stop (k,), mm, of the chains `which` (k,) lies inside a fence.
+
+    Chain, from, to (mm), and whether it is a whole loop, (j,) each. Tested every `spacing` mm, ends found by halving.
+    """
     chains = lengths.chains
-    everything = np.arange(len(chains.level))
-    probe = resample(lengths, everything, np.zeros_like(lengths.total), lengths.total, chains.closed, spacing)
-    distance = np.minimum(mesh.boundary_distance(probe.points, margin * 1.5), margin * 1.5)
+    whole_chain = chains.closed[which] & (start <= 0.0) & (stop >= lengths.total[which])
+    probe = resample(lengths, which, start, stop, whole_chain, spacing)
+    inside, allowed = fence.tests(probe.points)
     first, last = probe.bounds()
-    step = (lengths.total / np.maximum(last - first, 1))[probe.run]
-    inside = distance >= margin
-    allowed = distance >= floor
-    whole = chains.closed & (np.minimum.reduceat(allowed, first) > 0)
+    step = ((stop - start) / np.maximum(last - first, 1))[probe.run]
+    loop = whole_chain & np.logical_and.reduceat(allowed, first)
     new = np.concatenate([[True], np.diff(probe.run) > 0])
     begins = new | np.concatenate([[False], allowed[1:] & ~allowed[:-1]])
     piece = np.cumsum(begins) - 1
@@ -136,24 +138,30 @@ def _within_margin(
     # A piece runs on to the end of its chain after it has come too near: cut it at the last allowed sample.
     has = high >= 0
     low, high = low[has], high[has]
-    chain = probe.run[low]
-    before, after = np.maximum(low - 1, first[chain]), np.minimum(high + 1, last[chain])
+    run = probe.run[low]
+    chain, base = which[run], start[run]
+    before, after = np.maximum(low - 1, first[run]), np.minimum(high + 1, last[run])
     spans = step[low]
-    s0 = _margin_between(mesh, lengths, chain, (before - first[chain]) * spans, (low - first[chain]) * spans, margin)
-    s1 = _margin_between(mesh, lengths, chain, (after - first[chain]) * spans, (high - first[chain]) * spans, margin)
-    loop = whole[chain]
-    return chain, np.where(loop, 0.0, s0), np.where(loop, lengths.total[chain], s1), loop
+
+    def at(row: Ints) -> Array:
+        return np.asarray(base + (row - first[run]) * spans)
+
+    s0 = _turning(lengths, chain, at(before), at(low), fence)
+    s1 = _turning(lengths, chain, at(after), at(high), fence)
+    is_loop = loop[run]
+    return chain, np.where(is_loop, 0.0, s0), np.where(is_loop, lengths.total[chain], s1), is_loop
 
 
-def _margin_between(
-    mesh: PathMesh, lengths: Lengths, chain: Ints, outside: Array, inside: Array, margin: float
-) -> Array:
-    """Return where on the chains the margin is reached between two places (mm), by halving; `inside` keeps it."""
+def _turning(lengths: Lengths, chain: Ints, outside: Array, inside: Array, fence: Fence) -> Array:
+    """Return where on the chains the fence stands between two places (mm), by halving; `inside` lies within."""
     outside, inside = outside.copy(), inside.copy()
+    # Where a chain ends inside the fence there is nothing to seek.
+    moving = np.flatnonzero(outside != inside)
     for _ in range(_HALVINGS):
-        middle = 0.5 * (outside + inside)
-        kept = mesh.boundary_distance(_points_at(lengths, chain, middle), margin * 1.5) >= margin
-        inside, outside = np.where(kept, middle, inside), np.where(kept, outside, middle)
+        middle = 0.5 * (outside[moving] + inside[moving])
+        kept = fence.may_end(_points_at(lengths, chain[moving], middle))
+        inside[moving] = np.where(kept, middle, inside[moving])
+        outside[moving] = np.where(kept, outside[moving], middle)
     return inside
 
 

@@ -1,6 +1,6 @@
 """Which triangles of a part are inspected: flooded from seeds up to the creases, or the largest smooth face."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import igl
 import numpy as np
@@ -11,6 +11,7 @@ from scipy.sparse.csgraph import connected_components
 from planner.errors import fail
 from planner.frames import Array
 from planner.part import Part
+from planner.shapes import Box
 from planner.surface.facing import facing
 from planner.surface.inspection import InspectionSurface
 from planner.surface.topology import Edges, Index, edges_of, weld, weld_tolerance_mm
@@ -35,13 +36,15 @@ def inspection_surface(
     up_part: ArrayLike | None = None,
     crease_deg: float = 30.0,
     max_turn_deg: float | None = None,
+    box: Box | None = None,
 ) -> InspectionSurface:
     """Return the inspection surface of a part.
 
     seeds_part (n, 3) or (3,), mm: the region flooded from the triangle nearest each seed, across edges whose dihedral
-    angle is below crease_deg. Without seeds: the largest such region; of regions within 1 % of it the one that faces
-    up_part (3,) most (default +Z). A flood runs through tangent fillets, which have no crease, into the side walls:
-    max_turn_deg stops it where the facets have turned by more than that from the seed's (or from up_part).
+    angle is below crease_deg. Without seeds: the largest such region (with a box: the one with most area in it); of
+    regions within 1 % of it the one that faces up_part (3,) most (default +Z). A flood runs through tangent fillets,
+    which have no crease, into the side walls: max_turn_deg stops it where the facets have turned by more than that from
+    the seed's (or from up_part).
 
     Triangles that touch within rounding are joined even if the file does not share their vertices; edges of three or
     more faces are treated as creases. An open sheet has two sides of one size: the one that faces up_part is meant, and
@@ -58,7 +61,7 @@ def inspection_surface(
     allowed = _facing(part, up if start is None else part.face_normals[start].mean(axis=0), max_turn_deg)
     regions = smooth_regions(part, edges, crease_deg, allowed)
     if start is None:
-        chosen = [_largest(regions, up)]
+        chosen = [_largest(regions if box is None else _in_box(part, regions, box), up)]
     else:
         chosen = sorted(set(regions.label[start].tolist()))
         _expect_one_piece(part, edges, regions, chosen, seeds)
@@ -132,6 +135,20 @@ def _largest(regions: Regions, up: Array) -> int:
     # Rounded, so that the order of the file decides between equals and not the last bit.
     facing = np.round(regions.normals[alike] @ up, 6)
     return int(alike[np.argmax(facing)])
+
+
+def _in_box(part: Part, regions: Regions, box: Box) -> Regions:
+    """Return the regions with the areas they have in a box: of every triangle the share of its bounds that lies inside.
+
+    A ranking, no measure: exact where triangles are small. Nothing in the box at all leaves the areas as they were.
+    """
+    corners = part.vertices[part.faces]
+    low, high = corners.min(axis=1), corners.max(axis=1)
+    inside = np.minimum(high, box.max_mm) - np.maximum(low, box.min_mm)
+    size = np.maximum(high - low, 1e-9)
+    share = np.prod(np.clip((inside + 1e-9) / size, 0.0, 1.0), axis=1) * (inside >= 0.0).all(axis=1)
+    area = np.bincount(regions.label, part.face_areas_mm2 * share, len(regions.area_mm2)).astype(np.float64)
+    return replace(regions, area_mm2=area) if area.any() else regions
 
 
 def _seed_faces(part: Part, seeds: Array) -> NDArray[np.int64]:

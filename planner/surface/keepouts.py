@@ -1,0 +1,279 @@
+"""Keep-out regions on a surface: how far points lie from them, and the columns above those that must not be crossed."""
+
+from dataclasses import dataclass
+from functools import cached_property
+from weakref import WeakKeyDictionary
+
+import igl
+import numpy as np
+import trimesh
+from numpy.typing import NDArray
+from scipy.spatial import ConvexHull, QhullError
+
+from planner.errors import fail
+from planner.frames import Array
+from planner.part import Part
+from planner.setup import Setup
+from planner.shapes import BoxKeepOut, DiscKeepOut, FacesKeepOut, KeepOut, PolygonKeepOut, SphereKeepOut
+from planner.surface.inspection import InspectionSurface
+from planner.surface.normals import tangent_frames, unit
+from planner.surface.outlines import segment_distance_mm, signed_distance_mm
+
+PARENTS = "parent_faces"
+"""Key of `Part.meta` of a part whose triangles were cut finer: the row of the triangle as read, of each."""
+# A disc or polygon reaches this far off its plane at least (mm), or small ones would miss a curved surface.
+_LEAST_DEPTH_MM = 5.0
+# On triangles given by number: nearer than this beside them (mm, and as a share of the height over them) is on them.
+_ON_MM, _OVER = 1e-6, 0.1
+
+
+@dataclass(frozen=True, eq=False)
+class Column:
+    """What stands above a keep-out: a prism without end along `up` (3,) over an outline, above its foot; mm, `part`.
+
+    outline (m, 2): corners in the axes first, second (3,) about `origin` (3,); the prism is this wide and `radius_mm`
+    more. foot_mm: where it begins along `up`.
+    """
+
+    name: str
+    origin: Array
+    up: Array
+    first: Array
+    second: Array
+    outline: Array
+    radius_mm: float
+    foot_mm: float
+    margin_mm: float
+
+    def flat(self, points: Array) -> Array:
+        """Return points (n, 3) in the plane of the outline (n, 2)."""
+        d = points - self.origin
+        return np.stack([d @ self.first, d @ self.second], axis=-1)
+
+    def gap_mm(self, tip: Array, tail: Array, radius_mm: float) -> Array:
+        """Return how far rods from tip to tail (n, 3), this thick, stay beside the column (n,), mm; inf below its foot."""
+        low, high = ((p - self.origin) @ self.up - self.foot_mm + radius_mm for p in (tip, tail))
+        under = np.maximum(low, high) < 0.0
+        # Only what of the rod stands above the foot counts.
+        span = np.where(np.abs(high - low) > 1e-12, high - low, 1.0)
+        cut = np.clip(-low / span, 0.0, 1.0)[:, None]
+        at = tip + cut * (tail - tip)
+        start = np.where((low < 0.0)[:, None], at, tip)
+        end = np.where((high < 0.0)[:, None], at, tail)
+        gap = segment_distance_mm(self.flat(start), self.flat(end), self.outline) - self.radius_mm - radius_mm
+        return np.where(under, np.inf, gap)
+
+
+@dataclass(frozen=True, eq=False)
+class KeepOuts:
+    """The keep-out regions of a setup on one part.
+
+    shapes: as given. up (k, 3): outward normal of the surface at each. nozzle_mm: radius of the nozzle.
+    """
+
+    part: Part
+    shapes: tuple[KeepOut, ...]
+    up: Array
+    nozzle_mm: float
+
+    def __len__(self) -> int:
+        return len(self.shapes)
+
+    def gaps_mm(self, points: Array) -> Array:
+        """Return the distance (k, n), mm, of points (n, 3) on the surface from each region, negative inside."""
+        return np.stack([self._gap(i, points) for i in range(len(self))]) if len(self) else np.zeros((0, len(points)))
+
+    def inside(self, points: Array) -> NDArray[np.bool_]:
+        """Return which points (n, 3) of the surface lie in a region (n,)."""
+        return np.asarray((self.gaps_mm(points) < 0.0).any(axis=0))
+
+    def room_mm(self, points: Array, ahead_mm: float = 0.0, give_mm: float = 0.0) -> Array:
+        """Return how much more than they must points (n, 3) keep from the regions (n,), mm; negative: too near.
+
+        A TCP that takes data keeps `margin_mm`, of which `give_mm` may be used up, but stays outside. From what must not be
+        crossed it keeps as much beside the nozzle, and where a pass ends `ahead_mm` more, for the nozzle runs on.
+        """
+        if not len(self):
+            return np.full(len(points), np.inf)
+        return np.asarray(self.each_room_mm(points, ahead_mm, give_mm).min(axis=0))
+
+    def each_room_mm(self, points: Array, ahead_mm: float = 0.0, give_mm: float = 0.0) -> Array:
+        """Return the same for every region (k, n)."""
+        out = self.gaps_mm(points)
+        for i, shape in enumerate(self.shapes):
+            need = max(shape.margin_mm - give_mm, 0.0)
+            out[i] -= need if shape.may_cross else shape.margin_mm + self.nozzle_mm + ahead_mm
+        return out
+
+    @property
+    def smallest_mm(self) -> float:
+        """Width (mm) of the narrowest region with its margin, roughly: what a walk must not step over."""
+        sizes = [max(_size_mm(s) + 2.0 * s.margin_mm, 0.2) for s in self.shapes]
+        return min(sizes, default=np.inf)
+
+    @cached_property
+    def columns(self) -> tuple[Column, ...]:
+        """The columns above the regions that must not be crossed."""
+        return tuple(self._column(i) for i, s in enumerate(self.shapes) if not s.may_cross)
+
+    def label(self, index: int) -> str:
+        """Return what to call a region."""
+        return self.shapes[index].name or f"keep-out {index + 1}"
+
+    def _gap(self, index: int, points: Array) -> Array:
+        shape, up = self.shapes[index], self.up[index]
+        if isinstance(shape, SphereKeepOut):
+            return np.asarray(np.linalg.norm(points - shape.centre_mm, axis=1) - shape.radius_mm)
+        if isinstance(shape, BoxKeepOut):
+            low, high = np.array(shape.min_mm), np.array(shape.max_mm)
+            over = np.maximum(low - points, points - high)
+            return np.asarray(np.linalg.norm(np.maximum(over, 0.0), axis=1) + np.minimum(over.max(axis=1), 0.0))
+        if isinstance(shape, DiscKeepOut):
+            d = points - shape.centre_mm
+            height = d @ up
+            side = np.sqrt(np.maximum(np.einsum("ij,ij->i", d, d) - height**2, 0.0)) - shape.radius_mm
+            return _prism(side, np.abs(height) - max(shape.radius_mm, _LEAST_DEPTH_MM))
+        if isinstance(shape, PolygonKeepOut):
+            corners = np.array(shape.points_mm)
+            d, frame = points - corners.mean(axis=0), np.stack(_frame(up), axis=1)
+            side = signed_distance_mm(d @ frame, (corners - corners.mean(axis=0)) @ frame)
+            return _prism(side, np.abs(d @ up) - shape.depth_mm)
+        vertices, faces = self._painted(index)
+        points = np.ascontiguousarray(points)
+        _, face, at = igl.point_mesh_squared_distance(points, vertices, faces)
+        normal = unit(np.cross(*(vertices[faces[face, k]] - vertices[faces[face, 0]] for k in (1, 2))))
+        offset = points - at
+        height = np.einsum("ij,ij->i", offset, normal)
+        beside = np.sqrt(np.maximum(np.einsum("ij,ij->i", offset, offset) - height**2, 0.0))
+        # The smooth surface runs above or below the triangles; over them is on them.
+        return np.where(beside <= _ON_MM + _OVER * np.abs(height), -_ON_MM, beside)
+
+    def _painted(self, index: int) -> tuple[Array, NDArray[np.int64]]:
+        shape = self.shapes[index]
+        assert isinstance(shape, FacesKeepOut)
+        rows = _rows_of(self.part, shape, self.label(index), index)
+        used, compact = np.unique(self.part.faces[rows], return_inverse=True)
+        return np.ascontiguousarray(self.part.vertices[used]), compact.reshape(-1, 3).astype(np.int64)
+
+    def _tight(self, box: BoxKeepOut) -> Array:
+        """Return the bounds (2, 3) of what of the part lies in a box: how deep a box was drawn says nothing about it."""
+        corners = self.part.vertices[self.part.faces]
+        low, high = np.array(box.min_mm), np.array(box.max_mm)
+        meets = ((corners.min(axis=1) <= high) & (corners.max(axis=1) >= low)).all(axis=1)
+        if not meets.any():
+            return np.stack([low, high])
+        inside = np.clip(corners[meets].reshape(-1, 3), low, high)
+        return np.stack([inside.min(axis=0), inside.max(axis=0)])
+
+    def _column(self, index: int) -> Column:
+        shape, up = self.shapes[index], self.up[index]
+        first, second = _frame(up)
+        radius = 0.0
+        if isinstance(shape, SphereKeepOut | DiscKeepOut):
+            corners, radius = np.array([shape.centre_mm]), shape.radius_mm
+        elif isinstance(shape, PolygonKeepOut):
+            corners = np.array(shape.points_mm)
+        elif isinstance(shape, BoxKeepOut):
+            corners = trimesh.bounds.corners(self._tight(shape))
+        else:
+            corners = self._painted(index)[0]
+        origin = corners.mean(axis=0)
+        flat = np.stack([(corners - origin) @ first, (corners - origin) @ second], axis=1)
+        if not isinstance(shape, PolygonKeepOut) and len(flat) > 3:
+            flat = _hull(flat)
+        foot = float(((corners - origin) @ up).min()) - radius
+        return Column(self.label(index), origin, up, first, second, flat, radius, foot, shape.margin_mm)
+
+
+_KNOWN: "WeakKeyDictionary[InspectionSurface, tuple[object, KeepOuts]]" = WeakKeyDictionary()
+
+
+def keep_outs_of(surface: InspectionSurface, setup: Setup) -> KeepOuts:
+    """Return the keep-out regions of a setup on a surface; kept as long as the surface lives.
+
+    Raises EchoBaseError `keep-out-faces` for triangles that the part does not have.
+    """
+    key = (setup.inspection.keep_outs, setup.tool.nozzle_radius_mm)
+    known = _KNOWN.get(surface)
+    if known is None or known[0] != key:
+        up = np.array([_up(surface, s, i) for i, s in enumerate(key[0])]).reshape(-1, 3)
+        known = _KNOWN[surface] = (key, KeepOuts(surface.part, key[0], up, key[1]))
+    return known[1]
+
+
+def _up(surface: InspectionSurface, shape: KeepOut, index: int) -> Array:
+    """Return the outward normal of the surface at a region: of its own triangles, or of the one nearest to its middle."""
+    part = surface.part
+    if isinstance(shape, FacesKeepOut):
+        rows = _rows_of(part, shape, shape.name or f"keep-out {index + 1}", index)
+        return np.asarray(unit((part.face_areas_mm2[rows] @ part.face_normals[rows])[None])[0])
+    if isinstance(shape, PolygonKeepOut):
+        corners = np.array(shape.points_mm)
+        ahead = np.roll(corners, -1, axis=0)
+        normal = np.cross(corners - corners.mean(axis=0), ahead - corners.mean(axis=0)).sum(axis=0)
+        if not np.linalg.norm(normal) > 0.0:
+            raise fail(
+                "keep-out-flat", "The corners of a keep-out polygon lie on a line.", "Correct it.", _where(index)
+            )
+        near = _nearest_normal(surface, corners.mean(axis=0))
+        return np.asarray(unit(np.where(normal @ near < 0.0, -normal, normal)[None])[0])
+    middle = 0.5 * (np.array(shape.min_mm) + shape.max_mm) if isinstance(shape, BoxKeepOut) else shape.centre_mm
+    return _nearest_normal(surface, np.array(middle))
+
+
+def _nearest_normal(surface: InspectionSurface, point: Array) -> Array:
+    """Return the normal of the triangle nearest to a point, without a search tree over all of them."""
+    corners = surface.vertices[surface.faces]
+    centre = corners.mean(axis=1)
+    reach = np.linalg.norm(corners - centre[:, None], axis=2).max(axis=1)
+    away = np.linalg.norm(centre - point, axis=1)
+    near = np.flatnonzero(away - reach <= away.min())
+    closest = trimesh.triangles.closest_point(corners[near], np.tile(point, (len(near), 1)))
+    gap = np.linalg.norm(closest - point, axis=1)
+    alike = near[gap <= gap.min() + 1e-6]
+    return np.asarray(unit((surface.face_areas_mm2[alike] @ surface.face_normals[alike])[None])[0])
+
+
+def _rows_of(part: Part, shape: FacesKeepOut, name: str, index: int) -> NDArray[np.intp]:
+    parents = part.meta.get(PARENTS)
+    count = len(part.faces) if parents is None else int(parents.max()) + 1
+    if max(shape.faces) >= count:
+        raise fail(
+            "keep-out-faces",
+            f"{name} names triangle {max(shape.faces)}, but the part has {count}.",
+            "Paint it again: the part was changed or meshed anew.",
+            _where(index),
+        )
+    wanted = np.unique(np.array(shape.faces))
+    return wanted if parents is None else np.flatnonzero(np.isin(parents, wanted))
+
+
+def _where(index: int) -> str:
+    return f"setup.json: inspection.keep_outs[{index}]"
+
+
+def _size_mm(shape: KeepOut) -> float:
+    if isinstance(shape, SphereKeepOut | DiscKeepOut):
+        return 2.0 * shape.radius_mm
+    if isinstance(shape, BoxKeepOut):
+        return float(np.sort(np.subtract(shape.max_mm, shape.min_mm))[1])
+    if isinstance(shape, PolygonKeepOut):
+        return float(np.linalg.svd(np.array(shape.points_mm) - np.mean(shape.points_mm, axis=0))[1][1])
+    return 0.0
+
+
+def _prism(side: Array, end: Array) -> Array:
+    outside = np.hypot(np.maximum(side, 0.0), np.maximum(end, 0.0))
+    return np.asarray(outside + np.minimum(np.maximum(side, end), 0.0))
+
+
+def _frame(up: Array) -> tuple[Array, Array]:
+    first, second = tangent_frames(up[None])
+    return first[0], second[0]
+
+
+def _hull(flat: Array) -> Array:
+    try:
+        return flat[ConvexHull(flat).vertices]
+    except QhullError:
+        return flat[[int(flat[:, 0].argmin()), int(flat[:, 0].argmax())]]
