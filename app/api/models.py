@@ -55,6 +55,8 @@ class PartInfo(Answer):
     bytes: int
     triangles: int
     extents_mm: list[float] = Field(examples=[[150.0, 100.0, 10.0]])
+    centre_mm: list[float] | None = Field(None, examples=[[75.0, 50.0, 0.0]])
+    """Middle of its bounds in CAD coordinates."""
     size_if: dict[str, list[float]]
     """Its size in mm if the numbers of the file were meant in each unit: a check of the unit."""
     chord_error_mm: float | None

@@ -40,6 +40,7 @@ def keep_part(
         "bytes": source.size,
         "triangles": len(part.faces),
         "extents_mm": [round(float(v), 4) for v in part.extents_mm],
+        "centre_mm": [round(float(v), 4) for v in 0.5 * (part.vertices.min(axis=0) + part.vertices.max(axis=0))],
         "chord_error_mm": float(chord) if np.isfinite(chord) else None,
         "notes": list(part.provenance.notes),
     }

@@ -22,9 +22,11 @@ from app.view.model import TOPICS, Found, Insight, KeyPointSet, Topic
 from planner.frames import Array
 from planner.keypoint import KeyPoint, KeyPointList
 from planner.part import Part
-from planner.setup import Setup
+from planner.setup import Inspection, Setup
 from planner.surface.inspection import InspectionSurface
 from planner.toolpath import PathKind, ToolPath
+
+EDIT_ATTEMPTS = 5
 
 
 class StoreModel:
@@ -106,11 +108,31 @@ class StoreModel:
                 412, "keypoints-changed", text, "Look again, then repeat your change.", "keypoints"
             ) from refusal
 
-    def select_surface(self, seeds_part: Array, who: str) -> None:
-        """Choose the inspection surface by flooding from seed points (n, 3) in `part`."""
+    def select_surface(self, seeds_part: Array, who: str, more: bool = False) -> None:
+        """Choose the inspection surface by flooding from seed points (n, 3) in `part`; `more`: besides those there are."""
         rows = np.asarray(seeds_part, dtype=np.float64).reshape(-1, 3)
+        if more:
+            with self._store.db.read() as session:
+                rows = np.vstack([*inputs.seeds_in(session, self._id), rows])
         seeds = [dict(zip(("x_mm", "y_mm", "z_mm"), map(float, row), strict=True)) for row in rows]
         inputs.put(self._store, self._id, "surface", {"seeds": seeds}, None, who)
+
+    def edit_inspection(self, change: Callable[[Inspection], Inspection], who: str) -> None:
+        """Replace the inspection part of the settings by what `change` makes of the one in force."""
+        for attempt in range(EDIT_ATTEMPTS):
+            given = self._input("setup")
+            setup = Setup.model_validate(given.content)
+            after = setup.model_copy(update={"inspection": change(setup.inspection)})
+            # Validated once more: a change is made of numbers from a click.
+            content = Setup.model_validate(after.model_dump()).model_dump(mode="json")
+            try:
+                inputs.put(self._store, self._id, "setup", content, given.version, who)
+            except Refusal as refusal:
+                # Somebody saved the cell in between: the click still means what it meant.
+                if refusal.status != 412 or attempt + 1 == EDIT_ATTEMPTS:
+                    raise
+            else:
+                return
 
     def insight(self) -> Insight | None:
         """Compute what the key points of now are worth, in the thinker's process."""

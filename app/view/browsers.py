@@ -19,6 +19,9 @@ class Browser:
     step: str = "part"
     shown: set[str] = field(default_factory=lambda: set(layers_of("part")))
     pick: str = "none"
+    brush_mm: float = 20.0
+    """Radius of what a click paints, erases or keeps out."""
+    may_cross: bool = True
     probe: tuple[PathKind, float] = ("alignment", 0.0)
     probe_pose: tuple[tuple[float, ...], tuple[float, ...]] | None = None
     moved: bool = False

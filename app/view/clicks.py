@@ -9,16 +9,28 @@ import viser
 from app.view.browsers import Browser
 from app.view.draw_keypoints import positions
 from app.view.edits import added, too_close, without
+from app.view.edits_surface import INSPECTION_EDITS
 from app.view.loopback import user_of
 from app.view.picker import Hit, nearest_to_ray
 from planner.errors import fail
 from planner.frames import Array
 from planner.keypoint import KeyPoint
+from planner.surface.clip import is_chosen
+from planner.surface.keepouts import keep_outs_of
 
 if TYPE_CHECKING:
     from app.view.project_view import ProjectView
 
 DOUBLE_CLICK_S = 0.35
+
+
+def _refuse(region: str) -> None:
+    raise fail(
+        "keypoint-kept-out",
+        f"This place lies in the keep-out region '{region}' or its margin: no data are taken there.",
+        "Click elsewhere, or change the region in step Surface.",
+        "3D view",
+    )
 
 
 class Clicks:
@@ -59,21 +71,36 @@ class Clicks:
         picker = view.stage.picker
         hit = picker.cast(origin, direction) if picker is not None else None
         who = user_of(view.server, browser.client.client_id)
-        if browser.pick == "surface":
-            if hit is not None:
-                view.draw.put(lambda: view.model.select_surface(hit.point[None], who))
-            else:
-                self._complain(picker is not None, None)
+        if browser.pick in INSPECTION_EDITS or browser.pick == "surface":
+            self._edit_surface(browser, hit, picker is not None, who, added_seed=delete)
         elif delete:
             self._delete(origin, direction, who)
         else:
             self._add(picker is not None, hit, who)
         self.last_ms = (time.perf_counter() - started) * 1e3
 
+    def _edit_surface(self, browser: Browser, hit: Hit | None, ready: bool, who: str, added_seed: bool) -> None:
+        """Choose, paint, erase, keep out or draw at the place clicked; a shift-click adds to the places chosen."""
+        view = self._view
+        if hit is None:
+            self._complain(ready, None)
+            return
+        place = hit.point
+        if browser.pick == "surface":
+            view.draw.put(lambda: view.model.select_surface(place[None], who, more=added_seed))
+            return
+        change = INSPECTION_EDITS[browser.pick]
+        radius, may_cross = browser.brush_mm, browser.may_cross
+        view.draw.put(lambda: view.model.edit_inspection(lambda old: change(old, place, radius, may_cross), who))
+
     def _add(self, ready: bool, hit: Hit | None, who: str) -> None:
         view = self._view
-        if hit is None or not hit.on_surface:
+        if hit is None or not (hit.on_surface and is_chosen(view.model.setup().inspection, hit.point[None])[0]):
             self._complain(ready, hit)
+            return
+        region = self._region_at(hit.point)
+        if region is not None:
+            view.draw.put(lambda: _refuse(region))
             return
         points = self._ahead if self._ahead is not None else view.model.keypoints().points
         if too_close(points, hit.point, view.stage.ball_mm) is not None:
@@ -82,6 +109,15 @@ class Clicks:
         view.stage.keypoints(self._ahead)
         where = hit.point
         view.draw.put(lambda: self._commit(where, who))
+
+    def _region_at(self, where: Array) -> str | None:
+        """Return the name of the keep-out region that forbids a key point here, or None."""
+        surface = self._view.model.surface()
+        keep = keep_outs_of(surface, self._view.model.setup()) if surface is not None else None
+        if keep is None or not len(keep):
+            return None
+        room = keep.each_room_mm(where[None])[:, 0]
+        return keep.label(int(room.argmin())) if room.min() < 0.0 else None
 
     def _commit(self, where: Array, who: str) -> None:
         try:

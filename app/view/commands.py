@@ -8,7 +8,7 @@ from planner.setup import Strict
 
 StepName = Literal["part", "cell", "surface", "keypoints", "paths", "programs", "scan", "alignment", "report"]
 CameraName = Literal["iso", "front", "back", "left", "right", "top", "bottom", "surface"]
-PickName = Literal["none", "keypoints", "surface"]
+PickName = Literal["none", "keypoints", "surface", "paint", "erase", "keepout", "guide"]
 
 
 class ProbeAt(Strict):
@@ -34,6 +34,10 @@ class ViewCommand(Strict):
     """Look at a key point."""
     pick: PickName | None = None
     """What a click in the view does."""
+    brush_mm: float | None = Field(None, gt=0.0, le=10_000.0)
+    """Radius of what a click paints, erases or keeps out, mm."""
+    may_cross: bool | None = None
+    """Whether the tool may pass over what a click keeps out."""
     scan_by: Literal["standoff", "amplitude"] | None = None
     """Quantity that colours the scan points."""
     probe: ProbeAt | None = None

@@ -16,6 +16,7 @@ LAYERS: dict[str, Layer] = {
     "cad": Layer("/base/partnom/cad", "Part (CAD)"),
     "ghost": Layer("/base/partnom/ghost", "Part, transparent"),
     "surface": Layer("/base/partnom/surface", "Inspection surface"),
+    "regions": Layer("/base/partnom/regions", "Keep-outs, line drawn"),
     "coverage": Layer("/base/partnom/coverage", "Coverage of the alignment scan"),
     "keypoints": Layer("/base/partnom/keypoints", "Key points"),
     "alignment": Layer("/base/partnom/alignment", "Alignment path"),
@@ -31,9 +32,9 @@ LAYERS: dict[str, Layer] = {
 STEPS: dict[str, tuple[str, ...]] = {
     "part": ("axes", "cad"),
     "cell": ("axes", "cad"),
-    "surface": ("cad", "surface"),
-    "keypoints": ("cad", "surface", "coverage", "keypoints"),
-    "paths": ("cad", "inspection", "probe"),
+    "surface": ("cad", "surface", "regions"),
+    "keypoints": ("cad", "surface", "regions", "coverage", "keypoints"),
+    "paths": ("cad", "regions", "inspection", "probe"),
     "programs": ("cad", "alignment", "keypoints"),
     # The part stands somewhere else than the CAD: its points may lie inside.
     "scan": ("ghost", "keypoints", "scan"),

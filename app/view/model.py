@@ -15,7 +15,7 @@ from planner.frames import Array, Transform
 from planner.issues import Issue
 from planner.keypoint import KeyPoint
 from planner.part import Part
-from planner.setup import Setup
+from planner.setup import Inspection, Setup
 from planner.surface.inspection import InspectionSurface
 from planner.toolpath import PathKind, ToolPath
 
@@ -107,8 +107,12 @@ class ProjectModel(Protocol):
         """
         ...
 
-    def select_surface(self, seeds_part: Array, who: str) -> None:
-        """Choose the inspection surface by flooding from seed points (n, 3) in `part`."""
+    def select_surface(self, seeds_part: Array, who: str, more: bool = False) -> None:
+        """Choose the inspection surface by flooding from seed points (n, 3) in `part`; `more`: besides those there are."""
+        ...
+
+    def edit_inspection(self, change: Callable[[Inspection], Inspection], who: str) -> None:
+        """Replace the inspection part of the settings by what `change` makes of the one in force."""
         ...
 
     def insight(self) -> Insight | None:

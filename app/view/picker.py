@@ -8,6 +8,7 @@ from numpy.typing import NDArray
 from planner.frames import Array
 from planner.part import Part
 from planner.surface.inspection import InspectionSurface
+from planner.surface.keepouts import PARENTS
 
 
 @dataclass(frozen=True, eq=False)
@@ -42,7 +43,9 @@ class Picker:
         """Take over another inspection surface of the same part."""
         inspected = np.zeros(len(self._part.faces), dtype=np.bool_)
         if surface is not None:
-            inspected[surface.part_faces] = True
+            # A surface cut to a box or to paint has triangles of its own, which know those they were cut from.
+            parents = surface.part.meta.get(PARENTS)
+            inspected[surface.part_faces if parents is None else parents[surface.part_faces]] = True
         self._inspected = inspected
 
     def cast(self, origin: Array, direction: Array) -> Hit | None:

@@ -143,6 +143,8 @@ class ProjectView:
         for name, on in (command.layers or {}).items():
             if name in LAYERS:
                 (browser.shown.add if on else browser.shown.discard)(name)
+        browser.brush_mm = command.brush_mm or browser.brush_mm
+        browser.may_cross = browser.may_cross if command.may_cross is None else command.may_cross
         if command.pick is not None:
             browser.pick = command.pick
             self.clicks.listen(browser)
@@ -256,8 +258,8 @@ class ProjectView:
         stage = self.stage
         tasks = {
             "part": (stage.part, stage.surface),
-            "surface": (stage.surface, stage.coverage),
-            "setup": (stage.placement, stage.coverage),
+            "surface": (stage.surface, stage.regions, stage.coverage),
+            "setup": (stage.placement, stage.surface, stage.regions, stage.coverage),
             "keypoints": (self._note, stage.surface, stage.keypoints),
             "plan": (stage.paths, stage.coverage),
             "scan": (stage.scan,),

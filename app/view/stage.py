@@ -21,6 +21,7 @@ from app.view.draw_part import (
     sheet_of,
 )
 from app.view.draw_paths import draw_coverage, draw_path, draw_probe
+from app.view.draw_regions import draw_regions
 from app.view.draw_scan import Legend, draw_deviation, draw_scan
 from app.view.layers import LAYERS
 from app.view.model import Found, Insight, ProjectModel
@@ -48,6 +49,7 @@ class Stage:
         self._part: Part | None = None
         self._surface: InspectionSurface | None = None
         self._labels: set[str] = set()
+        self._regions: set[str] = set()
         self._frames = prepare(server)
 
     @property
@@ -106,6 +108,14 @@ class Stage:
             self._clear("ghost", "sheet")
         if self.picker is not None:
             self.picker.use(surface)
+
+    def regions(self) -> None:
+        """Outline the keep-out regions, the box, and the line drawn for the passes."""
+        surface = self.model.surface()
+        if surface is None or self.picker is None:
+            return
+        self._regions = draw_regions(self.server, surface, self.model.setup(), self.picker, self._regions)
+        self.server.flush()
 
     def keypoints(self, points: tuple[KeyPoint, ...] | None = None) -> None:
         """Draw the key points; with their verdicts if those are known for this very set."""

@@ -138,7 +138,7 @@ class KeepOuts:
             d, frame = points - corners.mean(axis=0), np.stack(_frame(up), axis=1)
             side = signed_distance_mm(d @ frame, (corners - corners.mean(axis=0)) @ frame)
             return _prism(side, np.abs(d @ up) - shape.depth_mm)
-        vertices, faces = self._painted(index)
+        vertices, faces = self.triangles(index)
         points = np.ascontiguousarray(points)
         _, face, at = igl.point_mesh_squared_distance(points, vertices, faces)
         normal = unit(np.cross(*(vertices[faces[face, k]] - vertices[faces[face, 0]] for k in (1, 2))))
@@ -148,7 +148,8 @@ class KeepOuts:
         # The smooth surface runs above or below the triangles; over them is on them.
         return np.where(beside <= _ON_MM + _OVER * np.abs(height), -_ON_MM, beside)
 
-    def _painted(self, index: int) -> tuple[Array, NDArray[np.int64]]:
+    def triangles(self, index: int) -> tuple[Array, NDArray[np.int64]]:
+        """Return vertices (v, 3) and faces (f, 3) of a region that was given as triangles."""
         shape = self.shapes[index]
         assert isinstance(shape, FacesKeepOut)
         rows = _rows_of(self.part, shape, self.label(index), index)
@@ -176,7 +177,7 @@ class KeepOuts:
         elif isinstance(shape, BoxKeepOut):
             corners = trimesh.bounds.corners(self._tight(shape))
         else:
-            corners = self._painted(index)[0]
+            corners = self.triangles(index)[0]
         origin = corners.mean(axis=0)
         flat = np.stack([(corners - origin) @ first, (corners - origin) @ second], axis=1)
         if not isinstance(shape, PolygonKeepOut) and len(flat) > 3:

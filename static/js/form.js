@@ -32,7 +32,8 @@ function resolve(schema, root) {
 /** All leaves of an object schema: [{path, key, schema}], groups as {key, schema, children}. */
 export function fieldsOf(schema, root, path = []) {
   const own = resolve(schema, root);
-  return Object.entries(own.properties ?? {}).map(([key, child]) => {
+  // Fields with a step of their own are edited there, in the 3D view.
+  return Object.entries(own.properties ?? {}).filter(([, child]) => !child["x-step"]).map(([key, child]) => {
     const s = resolve(child, root);
     const here = [...path, key];
     return s.properties ? { key, path: here, schema: s, children: fieldsOf(s, root, here) } : { key, path: here, schema: s };

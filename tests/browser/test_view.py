@@ -106,6 +106,35 @@ def test_a_click_off_the_inspection_surface_says_why(bare, page):
     assert not bare.model.keypoints().points
 
 
+def test_clicks_paint_keep_out_and_draw(bare, page):
+    def use(**tool):
+        command(bare, **tool)
+        page.wait_for_timeout(400)  # the browser learns what a click means
+
+    def click(x, y, shown):
+        page.mouse.click(*on_screen(bare, x, y)[0])
+        until(page, shown, what="the edit")
+        page.wait_for_timeout(400)
+
+    def now():
+        return bare.model.setup().inspection
+
+    use(step="surface", pick="paint", brush_mm=60.0)
+    looking(bare, page, "top")
+    click(-60.0, 0.0, lambda: len(now().paint) == 1)
+    assert np.hypot(now().paint[0].centre_mm[0] + 60.0, now().paint[0].centre_mm[1]) < 2.0
+    use(pick="keepout", brush_mm=12.0, may_cross=False)
+    click(-40.0, 10.0, lambda: len(now().keep_outs) == 1)
+    use(pick="guide")
+    click(-100.0, -20.0, lambda: len(now().guide) == 1)
+    click(0.0, 20.0, lambda: now().direction == "drawn")
+    # A key point in the clamp is refused in words.
+    use(step="keypoints", pick="keypoints")
+    page.mouse.click(*on_screen(bare, -38.0, 10.0)[0])
+    until(page, lambda: any(d.get("code") == "keypoint-kept-out" for _, d in bare.model.published), what="the refusal")
+    assert not bare.model.keypoints().points
+
+
 def test_layers_are_pixels_of_their_own_browser(bare, page, chromium):
     bare.model.plan()
     bare.model.scan()

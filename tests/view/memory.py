@@ -14,7 +14,7 @@ from planner.issues import Issue
 from planner.keypoint import KeyPoint
 from planner.part import Part, Provenance
 from planner.placement import assume_nominal
-from planner.setup import Setup
+from planner.setup import Inspection, Setup
 from planner.surface.inspection import InspectionSurface
 from planner.toolpath import Role, ToolPath
 
@@ -115,6 +115,7 @@ class MemoryModel:
         """Forget everything but the part."""
         self._keys = KeyPointSet((), self._keys.version + 1)
         self._paths, self._cloud, self._found, self.broken = {}, None, None, False
+        self._setup = self._setup.model_copy(update={"inspection": Inspection()})
         for topic in ("part", "keypoints", "plan", "scan", "alignment"):
             self.tell(topic)
 
@@ -148,9 +149,13 @@ class MemoryModel:
         self.tell("keypoints")
         return new
 
-    def select_surface(self, seeds_part: Array, who: str) -> None:
+    def select_surface(self, seeds_part: Array, who: str, more: bool = False) -> None:
         self.seeds.append(seeds_part)
         self.tell("surface")
+
+    def edit_inspection(self, change: Callable[[Inspection], Inspection], who: str) -> None:
+        self._setup = self._setup.model_copy(update={"inspection": change(self._setup.inspection)})
+        self.tell("setup")
 
     def insight(self) -> Insight | None:
         keys = self._keys
