@@ -21,6 +21,8 @@ DOF_NAMES = ("rx", "ry", "rz", "x", "y", "z")
 
 # Beyond this |B| (deg) A and C turn about the same axis and only their sum or difference is defined.
 GIMBAL_B_DEG = 89.999
+# Axes that are orthonormal within this are taken as they are.
+_ROUNDING = 1e-12
 
 
 class FrameMismatchError(TypeError):
@@ -66,7 +68,13 @@ class Transform:
     @classmethod
     def from_axes(cls, dst: Frame, src: Frame, x: Array, y: Array, z: Array, origin_mm: Array) -> Self:
         """Return the transform whose src axes x, y, z (each (3,) or (n, 3), orthonormal) and origin are given in dst."""
-        return cls.from_parts(dst, src, Rotation.from_matrix(np.stack([x, y, z], axis=-1)), origin_mm)
+        x, y, z, origin = (np.asarray(a, dtype=np.float64) for a in (x, y, z, origin_mm))
+        matrix = np.zeros((*np.broadcast_shapes(x.shape, origin.shape)[:-1], 4, 4))
+        matrix[..., :3, 0], matrix[..., :3, 1], matrix[..., :3, 2] = x, y, z
+        matrix[..., :3, 3], matrix[..., 3, 3] = origin, 1.0
+        if _orthonormal(x, y, z):
+            return cls(dst, src, RigidTransform(matrix, normalize=False, copy=False))
+        return cls.from_parts(dst, src, Rotation.from_matrix(matrix[..., :3, :3]), origin)
 
     @classmethod
     def from_xyzabc(cls, dst: Frame, src: Frame, xyzabc: ArrayLike) -> Self:
@@ -135,7 +143,7 @@ class Transform:
     @property
     def rotation_matrix(self) -> Array:
         """The (3, 3) or (n, 3, 3) rotation matrix; its columns are the src axes seen in dst."""
-        return np.asarray(self.rigid.rotation.as_matrix())
+        return np.ascontiguousarray(self.rigid.as_matrix()[..., :3, :3])
 
     @property
     def xyz_mm(self) -> Array:
@@ -164,6 +172,19 @@ class Transform:
     def renamed(self, dst: Frame, src: Frame) -> "Transform":
         """Return the same numbers under other names. Only `planner.placement` may call it, and says why."""
         return Transform(dst, src, self.rigid)
+
+
+def _orthonormal(x: Array, y: Array, z: Array) -> bool:
+    """Return whether axes (..., 3) are right-handed and orthonormal within rounding, so that nothing needs repair."""
+    if not x.size:
+        return True
+    unit = (np.einsum("...i,...i->...", a, a) - 1.0 for a in (x, y, z))
+    square = (np.einsum("...i,...i->...", a, b) for a, b in ((x, y), (y, z), (z, x)))
+    if max(float(np.abs(gap).max()) for gap in (*unit, *square)) > _ROUNDING:
+        return False
+    (x0, x1, x2), (y0, y1, y2) = np.moveaxis(x, -1, 0), np.moveaxis(y, -1, 0)
+    z0, z1, z2 = np.moveaxis(z, -1, 0)
+    return bool(((x1 * y2 - x2 * y1) * z0 + (x2 * y0 - x0 * y2) * z1 + (x0 * y1 - x1 * y0) * z2 > 0.0).all())
 
 
 def abc_deg(rotation: ArrayLike) -> Array:

@@ -1,6 +1,7 @@
 """What the array sweeps of the surface, and what of that within tolerance; in mm2."""
 
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
@@ -13,6 +14,7 @@ from planner.path.passes import LEAD_MM
 from planner.path.sampling import Samples, sample_equal_area, sample_every_face
 from planner.setup import Setup
 from planner.surface.curved import CurvedSurface
+from planner.surface.inspection import InspectionSurface
 from planner.surface.keepouts import keep_outs_of
 from planner.toolpath import ToolPath
 
@@ -28,7 +30,7 @@ class Coverage:
     kept_out_mm2: what lies in keep-out regions, neither swept nor missed. swept_share, within_share: 0..1 of the rest.
     Why of the missed area, each once: margin_mm2 lies in the edge margin, where no pass was asked for; beside_mm2 in the
     room that passes keep from keep-outs; beyond_mm2 was swept, but by laws whose own tilt or standoff is out of tolerance.
-    face_share, face_within_share (k,): shares per triangle of the surface, for drawing.
+    seen: the samples behind the figures.
     """
 
     area_mm2: float
@@ -41,8 +43,17 @@ class Coverage:
     beside_mm2: float
     beyond_mm2: float
     kept_out_mm2: float
-    face_share: Array
-    face_within_share: Array
+    seen: "Seen"
+
+    @cached_property
+    def face_share(self) -> Array:
+        """Swept share of every triangle of the surface (k,)."""
+        return self.seen.per_face(self.seen.swept)
+
+    @cached_property
+    def face_within_share(self) -> Array:
+        """Share of every triangle swept within tolerance (k,)."""
+        return self.seen.per_face(self.seen.within)
 
     @property
     def unexplained_mm2(self) -> float:
@@ -53,6 +64,28 @@ class Coverage:
     def share(self) -> float:
         """Swept share of the surface, 0..1: the coverage of an alignment scan."""
         return self.swept_share
+
+
+@dataclass(frozen=True, eq=False)
+class Seen:
+    """The samples of a coverage on a surface: where they are, and which of them (n,) are swept, and within tolerance."""
+
+    surface: InspectionSurface
+    samples: Samples
+    swept: NDArray[np.bool_]
+    within: NDArray[np.bool_]
+
+    def per_face(self, mark: NDArray[np.bool_]) -> Array:
+        """Return the marked share of every triangle (k,); where a triangle has no sample, that of the nearest which has."""
+        face, area, k = self.samples.face, self.samples.area_mm2, len(self.surface.part_faces)
+        whole = np.bincount(face, area, k)
+        share = np.bincount(face, area * mark, k) / np.maximum(whole, 1e-300)
+        empty = np.flatnonzero(whole == 0.0)
+        if len(empty):
+            middle = self.surface.vertices[self.surface.faces].mean(axis=1)
+            known = np.flatnonzero(whole > 0.0)
+            share[empty] = share[known[cKDTree(middle[known]).query(middle[empty])[1]]]
+        return share
 
 
 @dataclass(frozen=True, eq=False)
@@ -75,11 +108,11 @@ def coverage(curved: CurvedSurface, path: ToolPath, setup: Setup) -> Coverage:
     Swept: within half a swath (laws x pitch; the beam of a single crystal) either side of the way from one DATA pose to
     the next of the same pass, overlaps once, only what lies on the surface. Within tolerance: there the law that fires at
     the point meets the surface within `tolerances.tilt_deg`, at a standoff within `tolerances.standoff_mm` of the TCP's.
-    Measured at some hundred thousand evenly spread points, at least one in each triangle; several passes over a point
-    count by the best.
+    Measured at some hundred thousand evenly spread points; several passes over a point count by the best.
     """
     surface = curved.surface
-    samples = sample_every_face(surface, _SAMPLES)
+    few = len(surface.part_faces) < _SAMPLES
+    samples = sample_every_face(surface, _SAMPLES) if few else sample_equal_area(surface.face_areas_mm2, _SAMPLES)
     points, normals = curved.evaluate(samples.face, samples.bary)
     kept = keep_outs_of(surface, setup).inside(points)
     swept = np.zeros(len(points), dtype=bool)
@@ -204,8 +237,6 @@ def _summary(
     if len(keep):
         beside = ~edge & (keep.room_mm(at, LEAD_MM) < 0.0)
     beyond = swept[missed] & ~edge & ~beside
-    faces = len(curved.surface.part_faces)
-    whole = np.maximum(np.bincount(samples.face, area, faces), 1e-300)
     return Coverage(
         area_mm2=float(area.sum()),
         swept_mm2=float(area[swept].sum()),
@@ -217,6 +248,5 @@ def _summary(
         beside_mm2=float(area[missed][beside].sum()),
         beyond_mm2=float(area[missed][beyond].sum()),
         kept_out_mm2=float(area[kept].sum()),
-        face_share=np.bincount(samples.face, area * swept, faces) / whole,
-        face_within_share=np.bincount(samples.face, area * within, faces) / whole,
+        seen=Seen(curved.surface, samples, swept, within),
     )

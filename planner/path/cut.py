@@ -11,6 +11,7 @@ from planner.path.isolines import Chains
 from planner.path.mesh import PathMesh
 from planner.path.sampling import sample_equal_area
 from planner.surface.curved import CurvedSurface
+from planner.surface.normals import lengths
 from planner.surface.subdivide import Subdivision
 
 _SAMPLES = 20000
@@ -57,5 +58,5 @@ def tangent(direction: Array, normals: Array) -> Array:
     """Return the unit part of a direction (3,) or (n, 3) square to the normals (n, 3); zero where there is none."""
     d = np.broadcast_to(direction, normals.shape)
     t = d - np.einsum("ij,ij->i", d, normals)[:, None] * normals
-    length = np.linalg.norm(t, axis=1, keepdims=True)
+    length = lengths(t)[:, None]
     return np.divide(t, length, out=np.zeros_like(t), where=length > 1e-9)

@@ -7,6 +7,7 @@ from numpy.typing import NDArray
 
 from planner.frames import Array, Transform
 from planner.path.isolines import Ints
+from planner.surface.normals import lengths
 from planner.toolpath import PathKind, Role, ToolPath
 
 CLEARANCE_MM = 50.0
@@ -42,7 +43,7 @@ def contact_frames(points: Array, normals: Array, travel: Array) -> Transform:
 
 def _square(travel: Array, normals: Array) -> Array:
     x = travel - np.einsum("ij,ij->i", travel, normals)[:, None] * normals
-    return np.asarray(x / np.linalg.norm(x, axis=1, keepdims=True))
+    return np.asarray(x / lengths(x)[:, None])
 
 
 def headings(points: Array, normals: Array, travel: Array, run: Ints, across: Array | None) -> NDArray[np.int8]:

@@ -9,6 +9,7 @@ from planner.frames import Array
 from planner.path.fence import Fence
 from planner.path.isolines import Chains, Ints
 from planner.path.mesh import PathMesh
+from planner.surface.normals import lengths as row_lengths
 
 _HALVINGS = 20
 
@@ -82,7 +83,7 @@ def measure(mesh: PathMesh, chains: Chains) -> Lengths:
     """Return the chains with their segments' ends in space and their arc lengths."""
     corner = mesh.vertices[mesh.faces[chains.face]]
     a, b = (np.einsum("mk,mkj->mj", x, corner) for x in (chains.bary_in, chains.bary_out))
-    length = np.linalg.norm(b - a, axis=1)
+    length = row_lengths(b - a)
     end = np.cumsum(length)
     head = np.searchsorted(chains.chain, np.arange(len(chains.level)))
     tail = np.searchsorted(chains.chain, np.arange(len(chains.level)), side="right") - 1
@@ -104,7 +105,7 @@ def resample(
     head = np.searchsorted(chains.chain, numbers)
     tail = np.searchsorted(chains.chain, numbers, side="right") - 1
     seg = np.clip(np.searchsorted(lengths.end, s, side="left"), head[chain], tail[chain])
-    length = np.linalg.norm(lengths.b[seg] - lengths.a[seg], axis=1)
+    length = row_lengths(lengths.b[seg] - lengths.a[seg])
     t = np.clip(1.0 - np.divide(lengths.end[seg] - s, length, out=np.zeros_like(s), where=length > 0), 0.0, 1.0)[
         :, None
     ]

@@ -12,7 +12,7 @@ from scipy.sparse import coo_array
 from scipy.sparse.csgraph import connected_components
 
 from planner.frames import Array
-from planner.surface.normals import unit
+from planner.surface.normals import lengths, unit
 from planner.surface.topology import Edges, Index
 
 # Facets that turn by less than this (rad) are one plane; float32 files turn by up to 1e-5.
@@ -36,13 +36,13 @@ def find_flats(vertices: Array, faces: Index, edges: Edges) -> Flats:
     """Return the planar faces of a mesh: vertices (v, 3), mm, faces (f, 3)."""
     corners = vertices[faces]
     cross = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
-    normal, area = unit(cross), 0.5 * np.linalg.norm(cross, axis=1)
-    length = np.linalg.norm(vertices[edges.vertices[:, 0]] - vertices[edges.vertices[:, 1]], axis=1)
+    normal, area = unit(cross), 0.5 * lengths(cross)
+    length = lengths(vertices[edges.vertices[:, 0]] - vertices[edges.vertices[:, 1]])
     pair = np.flatnonzero(edges.uses == 2)
     a, b = edges.first[pair], edges.second[pair]
-    turn = np.arctan2(
-        np.linalg.norm(np.cross(normal[a], normal[b]), axis=1), np.einsum("ij,ij->i", normal[a], normal[b])
-    )
+    # By the chord between unit normals, exact for small turns.
+    chord = normal[a] - normal[b]
+    turn = 2.0 * np.arcsin(np.minimum(0.5 * lengths(chord), 1.0))
     inside = turn < COPLANAR_RAD
     f = len(faces)
     graph = coo_array((np.ones(int(inside.sum()), dtype=np.int8), (a[inside], b[inside])), shape=(f, f))

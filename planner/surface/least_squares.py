@@ -17,10 +17,19 @@ AGREE_RAD = 0.002
 BETTER = 0.5
 
 
-def solve_segments(phi: Array, h: Array, weight: Array, starts: NDArray[np.int64]) -> Array:
+def solve_segments(phi: Array, h: Array, weight: Array, starts: NDArray[np.int64], through: bool = False) -> Array:
     """Return weighted least-squares coefficients (n, terms) of h (p,) over features phi (terms, p), in the segments that
     begin at `starts` (n,).
+
+    through: the first feature is zero throughout (the polynomial goes through its node), and so is its coefficient.
     """
+    if through:
+        rest = _solve(phi[1:], h, weight, starts, RIDGE[1 : len(phi)])
+        return np.hstack([np.zeros((len(starts), 1)), rest])
+    return _solve(phi, h, weight, starts, RIDGE[: len(phi)])
+
+
+def _solve(phi: Array, h: Array, weight: Array, starts: NDArray[np.int64], ridge: Array) -> Array:
     terms = len(phi)
     matrix = np.zeros((len(starts), terms, terms))
     right = np.zeros((len(starts), terms))
@@ -32,7 +41,7 @@ def solve_segments(phi: Array, h: Array, weight: Array, starts: NDArray[np.int64
             matrix[:, j, i] = matrix[:, i, j]
     trace = np.einsum("nii->n", matrix) / terms
     diagonal = np.arange(terms)
-    matrix[:, diagonal, diagonal] += RIDGE[:terms] * np.maximum(trace, 1e-30)[:, None]
+    matrix[:, diagonal, diagonal] += ridge * np.maximum(trace, 1e-30)[:, None]
     return np.asarray(np.linalg.solve(matrix, right[..., None])[..., 0])
 
 

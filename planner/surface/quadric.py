@@ -108,7 +108,7 @@ def _fit(clusters: Clusters, rings: csr_array, nodes: NDArray[np.int64], terms: 
             phi[4] += _quadratic(spread, f, s) / k**2
             phi[5] += _quadratic(spread, s, s) / k**2
     h /= k
-    coefficients = solve_segments(phi, h, weight, starts)
+    coefficients = solve_segments(phi, h, weight, starts, through=exact)
     slope = residual_slope(phi, h, rho, coefficients[row])
     slope_rms = np.sqrt(np.add.reduceat(slope * slope, starts) / np.maximum(sizes - 1, 1))
     if exact:

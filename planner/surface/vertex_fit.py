@@ -9,7 +9,7 @@ from scipy.sparse import csr_array, eye_array
 from planner.frames import Array
 from planner.surface.clusters import Clusters, cluster
 from planner.surface.flats import find_flats
-from planner.surface.normals import angle_weighted_normals, unit
+from planner.surface.normals import angle_weighted_normals, lengths, unit
 from planner.surface.quadric import LocalFit, fit_nodes, monomials, two_rings
 from planner.surface.topology import Index, edges_of, vertex_graph
 
@@ -104,7 +104,7 @@ def _as_rows(rows: csr_array, nodes: NDArray[np.int64], n: int) -> csr_array:
 
 def _mean_link_mm(graph: csr_array, mean: Array) -> Array:
     row = np.repeat(np.arange(graph.shape[0]), np.diff(graph.indptr))
-    length = np.linalg.norm(mean[row] - mean[graph.indices], axis=1)
+    length = lengths(mean[row] - mean[graph.indices])
     n = np.maximum(np.bincount(row, minlength=graph.shape[0]), 1)
     return np.asarray(np.bincount(row, length, graph.shape[0]) / n)
 
