@@ -3,16 +3,18 @@
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
 from alignment.cloud import PointCloud
-from alignment.estimate.patches import model_readings, reading_weights
+from alignment.estimate.patches import model_readings, reading_weights, sample_rows
 from alignment.estimate.problem import Problem
 from alignment.estimate.robust import huber_weights, mad_sigma, tukey_weights
-from alignment.estimate.surface_rows import distance_rows
+from alignment.estimate.surface_rows import Track
 from planner.frames import Transform
+from planner.surface.follow import Follower
 
-SAMPLE = 3000
+SAMPLE = 1500
+# Of the sample so many find the way; all of it says where it ends.
+FEW = 500
 CONVEX_STEPS = 5
 STEPS = 40
 # What a single reading is taken to know (mm): more than it does, so that weak directions do not run off on noise.
@@ -36,17 +38,6 @@ class Captured:
     inlier_share: float
 
 
-def sample_rows(n: int, size: int = SAMPLE) -> NDArray[np.int64]:
-    """Return at most `size` row numbers spread over n rows, always the same ones.
-
-    The step is irrational to the rhythm of laws and poses (golden ratio), so that no law is favoured.
-    """
-    if n <= size:
-        return np.arange(n)
-    golden = 0.6180339887498949
-    return np.unique((np.arange(size) + np.modf(np.arange(size) * golden)[0]) * n // size).astype(np.int64)
-
-
 def capture(cloud: PointCloud, problem: Problem, start: Transform | None = None, size: int = SAMPLE) -> Captured:
     """Return the placement that a robust point-to-surface fit of a sample of readings converges to.
 
@@ -55,24 +46,34 @@ def capture(cloud: PointCloud, problem: Problem, start: Transform | None = None,
     scale of the day, which drops what belongs to something else.
     """
     rows = sample_rows(len(cloud), size)
-    origins, distance = (v[rows] for v in model_readings(cloud, problem.setup.alignment.point_model))
+    origins, distance = model_readings(cloud, problem.setup.alignment.point_model, rows)
     beams = None if cloud.beams_base is None else cloud.beams_base[rows]
-    heard = reading_weights(cloud)[rows]
+    heard = reading_weights(cloud, rows)
     T = problem.T_base_nominal if start is None else start
+    every = Track(problem.curved, origins, distance, beams)
+    few = np.arange(0, len(rows), max(1, len(rows) // FEW))
+    track = every
+    if len(few) < len(rows):
+        follower = Follower(problem.curved, loose=True)
+        track = Track(problem.curved, origins[few], distance[few], None if beams is None else beams[few], follower)
     scatter, valid_share, inlier_share, converged = np.inf, 0.0, 0.0, False
     last, share = np.inf, 1.0
     for i in range(STEPS):
-        found = distance_rows(problem.curved, T, problem.centre_mm(T), origins, distance, beams)
-        use = found.valid & (heard > 0)
+        weighed = heard if track is every else heard[few]
+        found = track.rows(T, problem.centre_mm(T))
+        use = found.valid & (weighed > 0)
         valid_share = float(use.mean())
         if use.sum() < LEAST_VALID:
-            break
+            if track is every:
+                break
+            track = every
+            continue
         r, x = found.r[use], found.jacobian[use] * problem.prior_sigma
         scatter = mad_sigma(r, 1e-3, about_zero=True)
         sigma = max(scatter, FLOOR_MM)
         robust = huber_weights(r, sigma) if i < CONVEX_STEPS else tukey_weights(r, sigma)
         inlier_share = float((np.abs(r) < 4.0 * sigma).mean())
-        weight = heard[use] * robust / READING_SIGMA_MM**2
+        weight = len(heard) / len(weighed) * weighed[use] * robust / READING_SIGMA_MM**2
         normal = (x * weight[:, None]).T @ x + np.eye(6)
         z = np.asarray(np.linalg.solve(normal, -(x * weight[:, None]).T @ r - problem.total(T)))
         moves = problem.moves_mm(z)
@@ -82,6 +83,8 @@ def capture(cloud: PointCloud, problem: Problem, start: Transform | None = None,
         last = moves
         T = problem.step(T, share * z)
         if i >= CONVEX_STEPS and share * moves < 0.2 * FLOOR_MM:
-            converged = True
-            break
+            if track is every:
+                converged = True
+                break
+            track, last, share = every, np.inf, 1.0
     return Captured(T, converged, float(scatter), valid_share, inlier_share)

@@ -11,6 +11,9 @@ from planner.frames import Array
 from planner.probe import law_offsets_mm
 from planner.setup import Probe
 
+# Cells that are too many become so many times longer.
+COARSER = 1.25
+
 
 @dataclass(frozen=True, eq=False)
 class Cells:
@@ -32,20 +35,33 @@ class Cells:
         return len(self.across_mm)
 
 
-def cells_along_passes(cloud: PointCloud, line: PoseLine, probe: Probe, cell_mm: float) -> Cells:
-    """Return cells of about `cell_mm` along each pass and across the laws."""
-    block_of_pose, s_from, s_to, block_pass = _stretches(line, cell_mm)
+def cells_along_passes(
+    cloud: PointCloud, line: PoseLine, probe: Probe, cell_mm: float, most: int | None = None
+) -> Cells:
+    """Return cells of about `cell_mm` along each pass and across the laws; larger ones until there are at most `most`."""
     x = law_offsets_mm(probe)
-    bands = max(1, round(float(np.ptp(x) + probe.pitch_mm) / cell_mm)) if len(x) > 1 else 1
-    band_of_law = (np.arange(len(x)) * bands) // len(x)
-    key = block_of_pose[cloud.pose_index] * bands + band_of_law[cloud.law - 1]
-    used = np.bincount(key, minlength=len(s_from) * bands) > 0
-    number = np.cumsum(used) - 1
+    heard = np.zeros((len(line.present), len(x)), dtype=bool)
+    heard.reshape(-1)[cloud.pose_index * np.int64(len(x)) + (cloud.law - 1)] = True
+    while True:
+        block_of_pose, s_from, s_to, block_pass = _stretches(line, cell_mm)
+        bands = max(1, round(float(np.ptp(x) + probe.pitch_mm) / cell_mm)) if len(x) > 1 else 1
+        band_of_law = (np.arange(len(x)) * bands) // len(x)
+        # Bands without a law have no cells either.
+        band, first = np.unique(band_of_law, return_index=True)
+        pose, k = np.nonzero(np.logical_or.reduceat(heard, first, axis=1))
+        key = block_of_pose[pose] * bands + band[k]
+        used = np.bincount(key, minlength=len(s_from) * bands) > 0
+        if most is None or int(used.sum()) <= most:
+            break
+        cell_mm *= COARSER
+    number = (np.cumsum(used) - 1).astype(np.int32)
     cell = np.flatnonzero(used)
     block, band = cell // bands, cell % bands
-    middle = np.bincount(band_of_law, x, bands) / np.bincount(band_of_law, minlength=bands)
+    middle = np.bincount(band_of_law, x, bands) / np.maximum(np.bincount(band_of_law, minlength=bands), 1)
+    at = (block_of_pose * bands).astype(np.int32)[cloud.pose_index]
+    at += np.r_[0, band_of_law].astype(np.int32)[cloud.law]
     return Cells(
-        number[key].astype(np.int32),
+        number[at],
         block_pass[block],
         s_from[block],
         s_to[block],
@@ -74,13 +90,17 @@ def _stretches(line: PoseLine, cell_mm: float) -> tuple[NDArray[np.int64], Array
     return block_of_pose, s_from, s_from + width[of_run], line.pass_id[rows[starts]][of_run]
 
 
-def cells_in_space(points: Array, cell_mm: float) -> Cells:
-    """Return cubic cells of surface points (n, 3) without a path."""
+def cells_in_space(points: Array, cell_mm: float, most: int | None = None) -> Cells:
+    """Return cubic cells of surface points (n, 3) without a path; larger ones until there are at most `most`."""
     low = points.min(axis=0)
-    index = np.floor((points - low) / cell_mm).astype(np.int64)
-    shape = index.max(axis=0) + 1
-    flat = (index[:, 0] * shape[1] + index[:, 1]) * shape[2] + index[:, 2]
-    used, of_reading = np.unique(flat, return_inverse=True)
+    while True:
+        index = np.floor((points - low) / cell_mm).astype(np.int64)
+        shape = index.max(axis=0) + 1
+        flat = (index[:, 0] * shape[1] + index[:, 1]) * shape[2] + index[:, 2]
+        used, of_reading = np.unique(flat, return_inverse=True)
+        if most is None or len(used) <= most:
+            break
+        cell_mm *= COARSER
     c = len(used)
     nan = np.full(c, np.nan)
     return Cells(

@@ -7,7 +7,7 @@ from functools import partial
 import numpy as np
 
 from alignment.cloud import PointCloud
-from alignment.estimate.capture import sample_rows
+from alignment.estimate.patches import sample_rows
 from planner.frames import Array, Transform
 from planner.probe import law_offsets_mm
 from planner.setup import Setup

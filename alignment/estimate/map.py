@@ -18,12 +18,13 @@ from alignment.estimate.patches import Patches, condense
 from alignment.estimate.pose_line import PoseLine, pose_line
 from alignment.estimate.problem import Problem
 from alignment.estimate.robust_fit import robust_fit
-from alignment.estimate.surface_rows import Rows
+from alignment.estimate.surface_rows import Rows, same_afresh
 from alignment.estimate.system import BIAS_SHARE, LAG_SIGMA_MM, EdgeData, System
 from planner.frames import Array, Transform
 from planner.setup import Setup
 from planner.surface.boundary import boundary
 from planner.surface.curved import CurvedSurface
+from planner.surface.follow import Follower
 
 CELL_MM = 8.0
 MOST_CELLS = 5_000
@@ -78,6 +79,16 @@ def align_map(cloud: PointCloud, curved: CurvedSurface, setup: Setup, edges: boo
     line = None if cloud.beams_base is None else pose_line(cloud, setup.probe)
     patches = condense_cloud(cloud, problem, captured.T_base_part, line)
     crossed = edge_data(cloud, problem, line) if edges else None
+    found = _fitted(problem, captured, patches, crossed)
+    if isinstance(found, MapFit) and not same_afresh(patches, curved, found.T_base_part, found.rows):
+        # Feet that were followed over a fold: now every patch asks the whole surface at every step.
+        strict = replace(patches, follower=Follower(curved))
+        found = _fitted(problem, captured, strict, crossed)
+    return found
+
+
+def _fitted(problem: Problem, captured: Captured, patches: Patches, crossed: EdgeData | None) -> MapFit | Captured:
+    setup, curved = problem.setup, problem.curved
     robust = robust_fit(patches, problem, captured.T_base_part, crossed)
     if robust.edges is not None:
         # Now that the edges are known, so is the angle at which they were crossed.
@@ -128,15 +139,11 @@ def condense_cloud(
 ) -> Patches:
     """Return the patches of a cloud: along its passes, or in space where it has none."""
     setup = problem.setup
-    size = CELL_MM
-    while True:
-        if cloud.beams_base is None:
-            cells = cells_in_space(cloud.origins_base, size)
-        else:
-            cells = cells_along_passes(cloud, line or pose_line(cloud, setup.probe), setup.probe, size)
-        if len(cells) <= MOST_CELLS:
-            break
-        size *= 1.25
+    if cloud.beams_base is None:
+        cells = cells_in_space(cloud.origins_base, CELL_MM, MOST_CELLS)
+    else:
+        line = pose_line(cloud, setup.probe) if line is None else line
+        cells = cells_along_passes(cloud, line, setup.probe, CELL_MM, MOST_CELLS)
     return condense(cloud, cells, problem.curved, T_base_part, setup.alignment.point_model)
 
 
@@ -168,7 +175,10 @@ def _plain_if_sprung(state: State, system: System, T_plain: Transform, held: Arr
     What is left is then no noise of a robot, and the best rigid placement is the one that leaves least of it.
     """
     plain = system.problem.step(T_plain, -(held @ (held.T @ system.problem.total(T_plain))))
-    left, least = (_rms_mm(system, T) for T in (state.T_base_part, plain))
+    left = _rms_mm(system, state.T_base_part)
+    if left <= MUCH_WORSE * SHAPE_MM:
+        return state
+    least = _rms_mm(system, plain)
     if least > SHAPE_MM and left > MUCH_WORSE * least:
         return replace(state, T_base_part=plain)
     return state

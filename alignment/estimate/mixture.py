@@ -3,15 +3,16 @@
 from dataclasses import dataclass
 
 import numpy as np
-from scipy.linalg import solve_triangular
 
-from alignment.estimate.noise_fit import NoiseFit, factor
+from alignment.estimate.noise_fit import NoiseFit, factor, whiten, whiten_back
 from alignment.estimate.noise_kernel import Kernel
 from alignment.estimate.noise_rows import NoiseRows
 from planner.frames import Array
 
 # Draws lighter than this share of the heaviest change nothing.
 LIGHT = 3e-3
+# Designs that differ by less than this share give the same estimate to this share of its standard deviation.
+SAME = 1e-3
 
 
 @dataclass(frozen=True, eq=False)
@@ -40,22 +41,38 @@ class Posterior:
 
 
 def mixture(rows: NoiseRows, fit: NoiseFit, most: int | None = None) -> Mixture:
-    """Return the least-squares operators of the noise models of a fit; of the heaviest `most` of them, if given."""
-    kernel = Kernel(rows)
+    """Return the least-squares operators of the noise models of a fit; of the heaviest `most` of them, if given.
+
+    Where the design is still that of the fit, what the fit found is all there is to it, and all models are taken.
+    """
     kept = np.flatnonzero(fit.weights > LIGHT * fit.weights.max())
-    if most is not None:
+    known = fit.x is not None and _same(rows.x, fit.x)
+    if most is not None and not known:
         kept = np.sort(kept[np.argsort(-fit.weights[kept], kind="stable")[:most]])
+    kernel = Kernel(rows)
     solved, information, weights = [], [], []
     for i in kept:
-        lower = factor(kernel.covariance(fit.draws[i]))
-        if lower is None:
+        found = fit.whitened[i] if known else _whitened(kernel, fit.draws[i], rows.x)
+        if found is None:
             continue
-        xw = solve_triangular(lower, rows.x, lower=True, check_finite=False)
-        solved.append(solve_triangular(lower.T, xw, lower=False, check_finite=False))
-        information.append(xw.T @ xw)
+        solved.append(found[1])
+        information.append(found[0].T @ found[0])
         weights.append(fit.weights[i])
     w = np.array(weights)
     return Mixture(w / w.sum(), np.array(solved), np.array(information))
+
+
+def _whitened(kernel: Kernel, theta: Array, x: Array) -> tuple[Array, Array] | None:
+    lower = factor(kernel.covariance(theta))
+    if lower is None:
+        return None
+    xw = whiten(lower, x)
+    return xw, whiten_back(lower, xw)
+
+
+def _same(x: Array, other: Array) -> bool:
+    """Return whether two designs differ by nothing that an estimate would feel."""
+    return x.shape == other.shape and bool((np.abs(x - other).max(axis=0) <= SAME * np.abs(other).max(axis=0)).all())
 
 
 def solve(mix: Mixture, r: Array, z: Array, held: Array, values: Array | None = None) -> Posterior:
@@ -67,13 +84,11 @@ def solve(mix: Mixture, r: Array, z: Array, held: Array, values: Array | None = 
     k = mix.unknowns
     free = complement(held, k)
     back = -held @ (held.T @ z if values is None else values)
-    steps, covariance = np.zeros((len(mix.weights), k)), np.zeros((k, k))
-    for i, w in enumerate(mix.weights):
-        info = mix.information[i]
-        pull = -mix.solved[i].T @ r - info @ back - z
-        inverse = np.linalg.inv(free.T @ info @ free + np.eye(free.shape[1]))
-        steps[i] = back + free @ (inverse @ (free.T @ pull))
-        covariance += w * free @ inverse @ free.T
+    info = mix.information
+    pull = -np.einsum("qnk,n->qk", mix.solved, r) - info @ back - z
+    inverse = np.linalg.inv(free.T @ info @ free + np.eye(free.shape[1]))
+    steps = back + np.einsum("qij,qj->qi", inverse, pull @ free) @ free.T
+    covariance = free @ np.einsum("q,qij->ij", mix.weights, inverse) @ free.T
     mean = mix.weights @ steps
     d = steps - mean
     covariance += (mix.weights[:, None] * d).T @ d + held @ held.T

@@ -10,7 +10,8 @@ scan; the mixture says so where plugging in the mode would not.
 from dataclasses import dataclass
 
 import numpy as np
-from scipy.linalg import cho_solve, solve_triangular
+from scipy.linalg.blas import dtrsm
+from scipy.linalg.lapack import dpotrf, dpotri
 from scipy.stats import norm, qmc
 
 from alignment.estimate.noise_kernel import NAMES, Kernel
@@ -62,13 +63,16 @@ class NoiseFit:
     """Posterior over the hyper-parameters of one scan.
 
     theta (9,): mode, logarithms of `NAMES`. draws (q, 9) and weights (q,): the mixture. effective: how many draws it is
-    worth.
+    worth. x (n, k): design it was found with; whitened: per draw L^-1 x (n, k) and the factor's other half of the way,
+    K^-1 x (n, k), or None where K is not positive definite. x None: found without residuals.
     """
 
     theta: Array
     draws: Array
     weights: Array
     effective: float
+    x: Array | None = None
+    whitened: tuple[tuple[Array, Array] | None, ...] = ()
 
     def named(self) -> dict[str, float]:
         """Return the mode by name, mm."""
@@ -89,11 +93,15 @@ def fit_noise(rows: NoiseRows, prior: NoisePrior, draws: int = DRAWS) -> NoiseFi
     side = np.where(unit >= 0.0, stretch[0], stretch[1])
     samples = np.tile(theta, (draws, 1))
     samples[:, active] += PROPOSAL_WIDTH * (unit * side) @ root.T
-    log_weight = np.array([_log_posterior(kernel, rows, prior, sample) for sample in samples])
+    log_weight, whitened = np.full(draws, -np.inf), []
+    for i, sample in enumerate(samples):
+        found = _at(kernel, rows, prior, sample)
+        whitened.append(None if found is None else (found.xw, whiten_back(found.lower, found.xw)))
+        log_weight[i] = -np.inf if found is None else found.value
     log_weight += (0.5 * unit**2 + np.log(side)).sum(axis=1)
     weights = np.exp(log_weight - log_weight.max())
     weights /= weights.sum()
-    return NoiseFit(theta, samples, weights, float(1.0 / (weights**2).sum()))
+    return NoiseFit(theta, samples, weights, float(1.0 / (weights**2).sum()), rows.x, tuple(whitened))
 
 
 def _stretch(kernel: Kernel, rows: NoiseRows, prior: NoisePrior, theta: Array, root: Array) -> Array:
@@ -103,48 +111,73 @@ def _stretch(kernel: Kernel, rows: NoiseRows, prior: NoisePrior, theta: Array, r
     doi:10.1111/j.1467-9868.2008.00700.x, use them for skewed hyper-parameters.
     """
     active = list(kernel.active)
-    top = _log_posterior(kernel, rows, prior, theta)
+    top = _at(kernel, rows, prior, theta)
+    assert top is not None
     out = np.ones((2, root.shape[1]))
     for i in range(root.shape[1]):
         for side, sign in enumerate((1.0, -1.0)):
             trial = theta.copy()
             trial[active] += sign * PROBE * root[:, i]
-            drop = top - _log_posterior(kernel, rows, prior, trial)
+            found = _at(kernel, rows, prior, trial)
+            drop = np.inf if found is None else top.value - found.value
             out[side, i] = np.clip(PROBE / np.sqrt(2.0 * max(drop, 1e-3)), *STRETCH_LIMITS)
     return out
 
 
 def factor(k: Array) -> Array | None:
-    """Return the lower Cholesky factor, or None if K is not positive definite to rounding."""
-    try:
-        return np.asarray(np.linalg.cholesky(k), dtype=np.float64)
-    except np.linalg.LinAlgError:
-        return None
+    """Return the lower Cholesky factor in the place of K (n, n), or None if K is not positive definite to rounding.
+
+    Above the diagonal the factor holds nothing of use.
+    """
+    # By columns, as LAPACK counts, K as it lies in memory is its own transpose.
+    upper, failed = dpotrf(k.T, lower=0, clean=0, overwrite_a=1)
+    return None if failed else np.asarray(upper.T, dtype=np.float64)
 
 
-def _log_posterior(kernel: Kernel, rows: NoiseRows, prior: NoisePrior, theta: Array) -> float:
+def whiten(lower: Array, b: Array) -> Array:
+    """Return L^-1 b (n, k), L (n, n) the lower factor."""
+    # BLAS counts by columns: L as it lies in memory is its own transpose there.
+    return np.asarray(dtrsm(1.0, lower.T, b, lower=0, trans_a=1), dtype=np.float64)
+
+
+def whiten_back(lower: Array, b: Array) -> Array:
+    """Return L^-T b (n, k)."""
+    return np.asarray(dtrsm(1.0, lower.T, b, lower=0), dtype=np.float64)
+
+
+@dataclass(frozen=True, eq=False)
+class At:
+    """value: logarithm of the posterior at some theta. lower (n, n): factor of its covariance. xw (n, k): L^-1 x."""
+
+    value: float
+    lower: Array
+    xw: Array
+
+
+def _at(kernel: Kernel, rows: NoiseRows, prior: NoisePrior, theta: Array) -> At | None:
+    """Return the posterior at theta (9,); None where K is not positive definite."""
     active = list(kernel.active)
     lower = factor(kernel.covariance(theta))
     if lower is None:
-        return -np.inf
-    xw, rw = (solve_triangular(lower, v, lower=True, check_finite=False) for v in (rows.x, rows.r))
-    inner = np.linalg.cholesky(xw.T @ xw + np.eye(rows.x.shape[1]) / WIDE**2)
-    explained = solve_triangular(inner, xw.T @ rw, lower=True)
-    value = -np.log(np.diag(lower)).sum() - np.log(np.diag(inner)).sum() - 0.5 * (rw @ rw - explained @ explained)
-    return float(value + prior.log_density(theta)[active].sum())
-
-
-def _projector(rows: NoiseRows, k: Array) -> tuple[Array, float] | None:
-    """Return P = K^-1 - K^-1 X (X' K^-1 X + 1/wide^2)^-1 X' K^-1, and the log of its likelihood."""
-    lower = factor(k)
-    if lower is None:
         return None
-    inverse = cho_solve((lower, True), np.eye(len(k)), check_finite=False)
+    w = whiten(lower, np.column_stack([rows.x, rows.r]))
+    xw, rw = w[:, :-1], w[:, -1]
+    inner = np.linalg.cholesky(xw.T @ xw + np.eye(rows.x.shape[1]) / WIDE**2)
+    explained = np.linalg.solve(inner, xw.T @ rw)
+    value = -np.log(np.diag(lower)).sum() - np.log(np.diag(inner)).sum() - 0.5 * (rw @ rw - explained @ explained)
+    return At(float(value + prior.log_density(theta)[active].sum()), lower, xw)
+
+
+def _projector(rows: NoiseRows, lower: Array) -> Array:
+    """Return P = K^-1 - K^-1 X (X' K^-1 X + 1/wide^2)^-1 X' K^-1 (n, n); the factor is used up."""
+    upper, _ = dpotri(lower.T, lower=0, overwrite_c=1)
+    half = np.tril(upper.T)
+    inverse = half + half.T
+    inverse[np.diag_indices(len(half))] *= 0.5
     kx = inverse @ rows.x
     inner = rows.x.T @ kx + np.eye(rows.x.shape[1]) / WIDE**2
-    p = inverse - kx @ np.linalg.solve(inner, kx.T)
-    value = -np.log(np.diag(lower)).sum() - 0.5 * np.linalg.slogdet(inner)[1] - 0.5 * rows.r @ p @ rows.r
-    return p, float(value)
+    inverse -= kx @ np.linalg.solve(inner, kx.T)
+    return inverse
 
 
 def _mode(kernel: Kernel, rows: NoiseRows, prior: NoisePrior, theta: Array) -> Array:
@@ -156,12 +189,11 @@ def _mode(kernel: Kernel, rows: NoiseRows, prior: NoisePrior, theta: Array) -> A
     for _ in range(STEPS):
         trial = here.copy()
         trial[active] += step
-        k, by = kernel.with_derivatives(trial)
-        found = _projector(rows, k)
-        value = -np.inf if found is None else found[1] + float(prior.log_density(trial)[active].sum())
-        if found is not None and value >= best - 1e-9:
-            gain = value - best
-            p, best, here = found[0], value, trial
+        found = _at(kernel, rows, prior, trial)
+        if found is not None and found.value >= best - 1e-9:
+            gain = found.value - best
+            best, here = found.value, trial
+            p, by = _projector(rows, found.lower), kernel.derivatives(trial)
             pr = p @ rows.r
             pulled = np.stack([d @ pr for d in by])
             precision = prior.precision(trial)[active]
@@ -183,8 +215,8 @@ def _mode(kernel: Kernel, rows: NoiseRows, prior: NoisePrior, theta: Array) -> A
 
 def _fisher(kernel: Kernel, rows: NoiseRows, theta: Array) -> Array:
     """Return the expected information tr(P Ki P Kj) / 2 of the active logarithms."""
-    k, by = kernel.with_derivatives(theta)
-    found = _projector(rows, k)
-    assert found is not None
-    turned = [found[0] @ d for d in by]
+    lower = factor(kernel.covariance(theta))
+    assert lower is not None
+    p = _projector(rows, lower)
+    turned = [p @ d for d in kernel.derivatives(theta)]
     return np.array([[0.5 * np.vdot(a, b.T) for b in turned] for a in turned])

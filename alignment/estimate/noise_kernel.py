@@ -10,6 +10,7 @@ from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
+from numpy.typing import NDArray
 from scipy.spatial.distance import pdist, squareform
 
 from alignment.estimate.noise_rows import NoiseRows
@@ -84,7 +85,19 @@ class Kernel:
             out += [EDGE_NUGGET, EDGE_PATH]
         return tuple(sorted(out))
 
-    def path_correlation(self, length_mm: float, gap_mm: float) -> Array:
+    @cached_property
+    def _block_pair(self) -> NDArray[np.intp]:
+        """Where the blocks of two rows stand in a flattened table of blocks (n, n)."""
+        block = self.rows.block.astype(np.intp)
+        return block[:, None] * len(self.rows.block_from_mm) + block[None, :]
+
+    @cached_property
+    def _room(self) -> tuple[Array, Array, Array]:
+        """Three (n, n) to work in: asking the system for memory costs as much as the arithmetic."""
+        n = len(self.rows)
+        return np.zeros((n, n)), np.zeros((n, n)), np.zeros((n, n))
+
+    def path_correlation(self, length_mm: float, gap_mm: float, out: Array | None = None) -> Array:
         """Return the correlation (n, n) of means over stretches of an exponential process along the path."""
         width = (self.rows.block_to_mm - self.rows.block_from_mm) / length_mm
         safe = np.maximum(width, 1e-9)
@@ -92,56 +105,63 @@ class Kernel:
         mean = np.where(small, 1.0 - 0.5 * width, -np.expm1(-safe) / safe)
         own = np.where(small, 1.0 - width / 3.0, 2.0 * (safe + np.expm1(-safe)) / safe**2)
         c = np.exp((self._apart + gap_mm * self._pass_step) / -length_mm)
-        c *= np.outer(mean, mean)
+        c *= mean[:, None]
+        c *= mean
         np.fill_diagonal(c, own)
-        return c.take(self.rows.block, axis=0).take(self.rows.block, axis=1)
+        # Every index is one of the table's: "clip" only says that no copy is needed to be safe.
+        return c.take(self._block_pair, out=out, mode="clip")
 
-    def field_correlation(self, length_mm: float) -> Array:
+    def field_correlation(self, length_mm: float, out: Array | None = None) -> Array:
         """Return the correlation (n, n) of the form error; edges measure something else."""
-        return np.exp(self._distance / -length_mm)
+        c = np.multiply(self._distance, -1.0 / length_mm, out=out)
+        return np.exp(c, out=c)
 
     def covariance(self, theta: Array) -> Array:
-        """Return K (n, n), mm2."""
-        k, _ = self._parts(theta, derivatives=False)
+        """Return K (n, n), mm2; the same memory at every call."""
+        v = np.exp(theta)
+        k, scale, part = self._room
+        self.field_correlation(v[FIELD_LENGTH], out=k)
+        k *= v[FIELD] ** 2
+        if self.rows.has_path:
+            self._path_scale(v, scale, part)
+            scale *= self.path_correlation(v[LENGTH], v[GAP], out=part)
+            k += scale
+        k[np.diag_indices(len(self.rows))] += sum(self._nuggets(v))
         return k
 
-    def with_derivatives(self, theta: Array) -> tuple[Array, list[Array]]:
-        """Return K (n, n) and its derivatives by the logarithms of the active hyper-parameters."""
-        return self._parts(theta, derivatives=True)
+    def _path_scale(self, v: Array, out: Array, part: Array) -> Array:
+        """Fill in the variance and covariance (n, n) of the error of the pose, were it one for all poses."""
+        surface, x, both = self._pair
+        np.multiply(surface, v[PATH] ** 2, out=out)
+        out += np.multiply(x, v[TILT] ** 2, out=part)
+        if both is not None:
+            out += np.multiply(both, v[EDGE_PATH] ** 2, out=part)
+        return out
 
-    def _parts(self, theta: Array, derivatives: bool) -> tuple[Array, list[Array]]:
+    def _nuggets(self, v: Array) -> tuple[Array, Array]:
+        """Variances (n,) that each row has for itself: of surface rows and of edge rows."""
+        edge, count = self.rows.edge, self.rows.count
+        return np.where(edge, 0.0, v[NUGGET] ** 2 / count), np.where(edge, v[EDGE_NUGGET] ** 2 / count, 0.0)
+
+    def derivatives(self, theta: Array) -> list[Array]:
+        """Return the derivatives (n, n) of K by the logarithms of the active hyper-parameters."""
         v = np.exp(theta)
-        rows = self.rows
-        by: dict[int, Array] = {}
-        nugget = np.where(rows.edge, 0.0, v[NUGGET] ** 2 / rows.count)
-        diagonal = nugget.copy()
-        k = self.field_correlation(v[FIELD_LENGTH])
-        k *= v[FIELD] ** 2
-        if derivatives:
-            by[NUGGET] = np.diag(2.0 * nugget)
-            by[FIELD] = 2.0 * k
-            by[FIELD_LENGTH] = k * (self._distance / v[FIELD_LENGTH])
-        if rows.has_path:
+        nugget, edge_nugget = self._nuggets(v)
+        field = v[FIELD] ** 2 * self.field_correlation(v[FIELD_LENGTH])
+        by = {
+            NUGGET: np.diag(2.0 * nugget),
+            FIELD: 2.0 * field,
+            FIELD_LENGTH: field * (self._distance / v[FIELD_LENGTH]),
+            EDGE_NUGGET: np.diag(2.0 * edge_nugget),
+        }
+        if self.rows.has_path:
             surface, x, both = self._pair
-            scale = v[PATH] ** 2 * surface
-            scale += v[TILT] ** 2 * x
+            scale = self._path_scale(v, *self._room[1:])
+            c, h = self.path_correlation(v[LENGTH], v[GAP]), 1e-4
+            by[PATH] = 2.0 * v[PATH] ** 2 * surface * c
+            by[TILT] = 2.0 * v[TILT] ** 2 * x * c
             if both is not None:
-                scale += v[EDGE_PATH] ** 2 * both
-            c = self.path_correlation(v[LENGTH], v[GAP])
-            if derivatives:
-                h = 1e-4
-                by[PATH] = 2.0 * v[PATH] ** 2 * surface * c
-                by[TILT] = 2.0 * v[TILT] ** 2 * x * c
-                if both is not None:
-                    by[EDGE_PATH] = 2.0 * v[EDGE_PATH] ** 2 * both * c
-                by[LENGTH] = scale * (self.path_correlation(v[LENGTH] * np.exp(h), v[GAP]) - c) / h
-                by[GAP] = scale * (self.path_correlation(v[LENGTH], v[GAP] * np.exp(h)) - c) / h
-            scale *= c
-            k += scale
-        if rows.edge.any():
-            edge = np.where(rows.edge, v[EDGE_NUGGET] ** 2 / rows.count, 0.0)
-            diagonal = diagonal + edge
-            if derivatives:
-                by[EDGE_NUGGET] = np.diag(2.0 * edge)
-        k[np.diag_indices(len(rows))] += diagonal
-        return k, [by[i] for i in self.active] if derivatives else []
+                by[EDGE_PATH] = 2.0 * v[EDGE_PATH] ** 2 * both * c
+            by[LENGTH] = scale * (self.path_correlation(v[LENGTH] * np.exp(h), v[GAP]) - c) / h
+            by[GAP] = scale * (self.path_correlation(v[LENGTH], v[GAP] * np.exp(h)) - c) / h
+        return [by[i] for i in self.active]

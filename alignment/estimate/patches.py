@@ -1,20 +1,28 @@
 """Readings condensed to patches in one linear pass: robust means that a curved surface does not bias."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.sparse import csc_array
 
 from alignment.cloud import PointCloud
 from alignment.estimate.cells import Cells
 from alignment.estimate.robust import mad_sigma, tukey_weights
 from planner.frames import Array, Transform
 from planner.surface.curved import CurvedSurface
+from planner.surface.follow import Follower
 
 # Readings that are looked at to find the median of their cell.
 SORTED_READINGS = 150_000
 # Below this share of the usual amplitude a reading counts less: half the beam may be off the part.
 FULL_AMPLITUDE = 0.6
+# Readings worked on at a time.
+SLICE = 32_768
+EVERY = slice(None)
+# The six entries of a symmetric matrix.
+PAIRS = np.triu_indices(3)
 
 
 @dataclass(frozen=True, eq=False)
@@ -24,7 +32,8 @@ class Patches:
     origins_base (p, 3), distance_mm (p,): means. spread (p, 3, 3): covariance of the origins within, mm2. hessian_base
     (p, 3, 3): curvature of the distance to the surface, 1/mm. count (p,): readings it is worth. scatter_mm (p,): their
     standard deviation. amplitude_pct (p,). beams_base (p, 3): zero without beams. cells: where on the path.
-    rejected: readings thrown out as not belonging to their neighbours. sigma_mm: scatter of single readings.
+    kept (n,): readings not thrown out as not belonging to their neighbours. sigma_mm: scatter of single readings.
+    follower: knows where on the surface the patches were when they were made; tracks: what is known of their residuals.
     """
 
     origins_base: Array
@@ -38,6 +47,8 @@ class Patches:
     cells: Cells
     kept: NDArray[np.bool_]
     sigma_mm: float
+    follower: Follower | None = None
+    tracks: dict[int, Any] = field(default_factory=dict, init=False, repr=False)
 
     def __len__(self) -> int:
         return len(self.distance_mm)
@@ -48,26 +59,47 @@ class Patches:
         return 0.5 * np.einsum("pij,pij->p", self.hessian_base, self.spread)
 
 
-def model_readings(cloud: PointCloud, point_model: str) -> tuple[Array, Array]:
+def model_readings(cloud: PointCloud, point_model: str, rows: NDArray | slice = EVERY) -> tuple[Array, Array]:
     """Return (origins (n, 3), distances (n,)) such that distance - dist(origin, surface) is the residual.
 
     perpendicular: law origins and measured distances. axial (and ready surface points): points, which lie at distance 0.
     """
-    if cloud.beams_base is None or point_model == "axial":
-        return cloud.axial_points_base, np.zeros(len(cloud))
-    return cloud.origins_base, cloud.distance_mm
+    origins, distance = cloud.origins_base[rows], cloud.distance_mm[rows]
+    if cloud.beams_base is None:
+        return origins, np.zeros(len(origins))
+    if point_model == "axial":
+        return origins + distance[:, None] * cloud.beams_base[rows], np.zeros(len(origins))
+    return origins, distance
 
 
-def reading_weights(cloud: PointCloud) -> Array:
-    """Return weights (n,) from amplitude: full from 60 % of the median on, falling to zero with it; 1 where unknown."""
-    a = cloud.amplitude_pct
-    known = np.isfinite(a)
-    if not known.any():
-        return np.ones(len(a))
-    usual = float(np.median(a[known]))
+def reading_weights(cloud: PointCloud, rows: NDArray | slice = EVERY) -> Array:
+    """Return weights (n,) from amplitude: full from 60 % of the median on, falling to zero with it; 1 where unknown.
+
+    Of very many readings the median of a part of them, spread evenly, is taken.
+    """
+    a = cloud.amplitude_pct[rows]
+    # An odd step does not keep to the rhythm of an even number of laws.
+    look = cloud.amplitude_pct[:: (len(cloud) // SORTED_READINGS) | 1]
+    look = look[np.isfinite(look)]
+    usual = float(np.median(look)) if len(look) else 0.0
     if usual <= 0.0:
         return np.ones(len(a))
-    return np.where(known, np.clip(a / (FULL_AMPLITUDE * usual), 0.0, 1.0) ** 2, 1.0)
+    weight = a * (1.0 / (FULL_AMPLITUDE * usual))
+    np.clip(weight, 0.0, 1.0, out=weight)
+    weight *= weight
+    weight[np.isnan(weight)] = 1.0
+    return weight
+
+
+def sample_rows(n: int, size: int) -> NDArray[np.int64]:
+    """Return at most `size` row numbers spread over n rows, always the same ones.
+
+    The step is irrational to the rhythm of laws and poses (golden ratio), so that no law is favoured.
+    """
+    if n <= size:
+        return np.arange(n)
+    golden = 0.6180339887498949
+    return np.unique((np.arange(size) + np.modf(np.arange(size) * golden)[0]) * n // size).astype(np.int64)
 
 
 def condense(
@@ -76,68 +108,101 @@ def condense(
     """Return the patches of a cloud whose part is already placed to about the robust scatter of the readings.
 
     Within a patch the distance to the surface is expanded to second order about the patch's middle, so that the robust
-    mean and the rejection see no curvature; the expansion's mean (tr H Cov / 2) is kept and added back exactly.
+    mean and the rejection see no curvature; the expansion's mean (tr H Cov / 2) is kept and added back exactly. Readings
+    are taken a slice at a time, so that what is worked out of them stays in the processor's cache.
     """
-    origins, distance = model_readings(cloud, point_model)
-    weight = reading_weights(cloud)
     cell, c = cells.of_reading, len(cells)
-    count = np.maximum(np.bincount(cell, minlength=c), 1)
-    middle = np.stack([np.bincount(cell, origins[:, k], c) / count for k in range(3)], axis=1)
-    T_part_base = T_base_part.inv()
-    foot = curved.closest(T_part_base.points(middle))
-    normal = T_base_part.directions(foot.normals)
+    total = np.zeros((c, 4))
+    for rows in _slices(len(cloud)):
+        origins, _ = model_readings(cloud, point_model, rows)
+        total += _sums(cell[rows], c, np.vstack([origins.T, np.ones(len(origins))]))
+    middle = total[:, :3] / np.maximum(total[:, 3:], 1.0)
+    follower = Follower(curved, loose=True)
+    foot = follower.closest(T_base_part.inv().points(middle))
     hessian = distance_hessian(curved.shape_operator(foot.face, foot.bary), foot.distance_mm)
     r = T_base_part.rotation_matrix
     hessian = r @ hessian @ r.T
-    d = origins - middle[cell]
-    expected = foot.distance_mm[cell] + np.einsum("ni,ni->n", d, normal[cell])
-    expected += 0.5 * quadratic(hessian, cell, d)
-    residual = distance - expected
-    weight, sigma = _robust(residual, weight, cell, c)
-    total = np.bincount(cell, weight, c)
-    safe = np.where(total > 0, total, 1.0)
+    gradient = T_base_part.directions(foot.normals).T.copy()
+    curved_by = (hessian * np.where(np.eye(3, dtype=bool), 0.5, 1.0)).transpose(1, 2, 0).copy()
+    residual = np.zeros(len(cloud))
+    for rows in _slices(len(cloud)):
+        at = cell[rows]
+        origins, distance = model_readings(cloud, point_model, rows)
+        d = [origins[:, k] - middle[:, k].take(at) for k in range(3)]
+        left = distance - foot.distance_mm.take(at)
+        for i in range(3):
+            slope = gradient[i].take(at)
+            for j in range(i, 3):
+                slope += curved_by[i, j].take(at) * d[j]
+            left -= slope * d[i]
+        residual[rows] = left
+    weight, sigma = _robust(residual, reading_weights(cloud), cell, c)
+    return _weighted(cloud, cells, middle, residual, weight, sigma, hessian, follower, point_model)
 
-    def mean(values: Array) -> Array:
-        return np.bincount(cell, weight * values, c) / safe
 
-    offset = np.stack([mean(d[:, k]) for k in range(3)], axis=1)
+def _weighted(
+    cloud: PointCloud,
+    cells: Cells,
+    middle: Array,
+    residual: Array,
+    weight: Array,
+    sigma_mm: float,
+    hessian: Array,
+    follower: Follower,
+    point_model: str,
+) -> Patches:
+    """Return the patches as the weighted means of their readings."""
+    cell, c = cells.of_reading, len(cells)
+    sums = np.zeros((c, 18))
+    for rows in _slices(len(cloud)):
+        at, w = cell[rows], weight[rows]
+        origins, distance = model_readings(cloud, point_model, rows)
+        x = np.zeros((18, len(at)))
+        for k in range(3):
+            np.subtract(origins[:, k], middle[:, k].take(at), out=x[k])
+        for k, (i, j) in enumerate(zip(*PAIRS, strict=True)):
+            np.multiply(x[i], x[j], out=x[3 + k])
+        x[9], x[10] = residual[rows], residual[rows] ** 2
+        x[11], x[12] = distance, np.nan_to_num(cloud.amplitude_pct[rows])
+        if cloud.beams_base is not None:
+            x[13:16] = cloud.beams_base[rows].T
+        x[16], x[17] = 1.0, w
+        x *= w
+        sums += _sums(at, c, x)
+    total, squares = sums[:, 16], sums[:, 17]
+    mean = sums / np.where(total > 0, total, 1.0)[:, None]
+    offset, centre = mean[:, :3], mean[:, 9]
     spread = np.zeros((c, 3, 3))
-    for i in range(3):
-        for j in range(i, 3):
-            spread[:, i, j] = spread[:, j, i] = mean(d[:, i] * d[:, j]) - offset[:, i] * offset[:, j]
-    centre = mean(residual)
-    scatter = np.sqrt(np.maximum(mean(residual**2) - centre**2, 0.0))
-    worth = np.divide(total**2, np.bincount(cell, weight**2, c), out=np.zeros(c), where=total > 0)
-    amplitude = (
-        mean(np.nan_to_num(cloud.amplitude_pct)) if np.isfinite(cloud.amplitude_pct).any() else np.full(c, np.nan)
+    spread[:, PAIRS[0], PAIRS[1]] = spread[:, PAIRS[1], PAIRS[0]] = (
+        mean[:, 3:9] - offset[:, PAIRS[0]] * offset[:, PAIRS[1]]
     )
-    beams = np.zeros((c, 3))
-    if cloud.beams_base is not None:
-        beams = np.stack([mean(cloud.beams_base[:, k]) for k in range(3)], axis=1)
+    heard = bool(np.isfinite(cloud.amplitude_pct).any())
     return Patches(
         middle + offset,
-        mean(distance),
+        mean[:, 11].copy(),
         spread,
         hessian,
-        worth,
-        scatter,
-        amplitude,
-        beams,
+        np.divide(total**2, squares, out=np.zeros(c), where=total > 0),
+        np.sqrt(np.maximum(mean[:, 10] - centre**2, 0.0)),
+        mean[:, 12].copy() if heard else np.full(c, np.nan),
+        mean[:, 13:16].copy(),
         cells,
         weight > 0,
-        sigma,
+        sigma_mm,
+        follower,
     )
 
 
-def quadratic(matrices: Array, of_row: NDArray, d: Array) -> Array:
-    """Return d' M d (n,) with symmetric M (c, 3, 3) picked by of_row (n,)."""
-    out = np.zeros(len(d))
-    for i in range(3):
-        for j in range(i, 3):
-            entry = matrices[:, i, j] * (1.0 if i == j else 2.0)
-            if np.abs(entry).max(initial=0.0) > 1e-12:
-                out += entry[of_row] * d[:, i] * d[:, j]
-    return out
+def _slices(n: int) -> list[slice]:
+    return [slice(i, min(i + SLICE, n)) for i in range(0, n, SLICE)]
+
+
+def _sums(cell: NDArray[np.int32], c: int, x: Array) -> Array:
+    """Return the sums (c, k) of x (k, m) over cells (m,). Neighbouring readings mostly share a cell: they are summed first."""
+    start = np.flatnonzero(np.r_[True, cell[1:] != cell[:-1]])
+    runs = np.add.reduceat(x, start, axis=1)
+    n = len(start)
+    return np.asarray(csc_array((np.ones(n), cell[start], np.arange(n + 1, dtype=np.int32)), shape=(c, n)) @ runs.T)
 
 
 def distance_hessian(shape_operator: Array, distance_mm: Array) -> Array:
@@ -152,12 +217,13 @@ def distance_hessian(shape_operator: Array, distance_mm: Array) -> Array:
 def _robust(residual: Array, weight: Array, cell: NDArray[np.int32], c: int) -> tuple[Array, float]:
     """Return weights (n,) and the scatter of single readings, by Tukey's biweight about each cell's location."""
     n = len(residual)
-    step = max(1, n // SORTED_READINGS)
-    look = np.arange(0, n, step)
+    look = np.arange(0, n, max(1, n // SORTED_READINGS))
     look = look[weight[look] > 0]
-    order = look[np.lexsort((residual[look], cell[look]))]
+    # By cell, and within it by residual, in one sort: residuals squeezed into less than the step between cells.
+    low, high = (float(f(residual[look], initial=0.0)) for f in (np.min, np.max))
+    order = look[np.argsort(cell[look] + (residual[look] - low) / (1.0 + 1e-9 + high - low), kind="stable")]
     counts = np.bincount(cell[look], minlength=c)
-    first = np.r_[0, np.cumsum(counts)[:-1]]
+    first = np.cumsum(counts) - counts
     lower, upper = first + np.maximum(counts - 1, 0) // 2, first + counts // 2
     sorted_residual = np.append(residual[order], 0.0)
     last = len(order)
@@ -168,10 +234,13 @@ def _robust(residual: Array, weight: Array, cell: NDArray[np.int32], c: int) -> 
     many = counts[cell[look]] > 2
     inside = residual[look][many] - centre[cell[look]][many]
     sigma = mad_sigma(inside, 1e-4, about_zero=True)
-    out = weight
+    out = np.zeros(n)
     for _ in range(2):
-        out = weight * tukey_weights(residual - centre[cell], 1.2 * sigma)
-        total = np.bincount(cell, out, c)
-        shifted = np.bincount(cell, out * residual, c) / np.where(total > 0, total, 1.0)
-        centre = np.where(total > 0, shifted, centre)
+        sums = np.zeros((c, 2))
+        for rows in _slices(n):
+            at, r = cell[rows], residual[rows]
+            w = weight[rows] * tukey_weights(r - centre.take(at), 1.2 * sigma)
+            out[rows] = w
+            sums += _sums(at, c, np.stack([w, w * r]))
+        centre = np.where(sums[:, 0] > 0, sums[:, 1] / np.where(sums[:, 0] > 0, sums[:, 0], 1.0), centre)
     return out, sigma

@@ -1,17 +1,26 @@
 """Residuals of patches against the placed surface, and how they change as the part moves."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
 
-from alignment.estimate.motion import motion_rows
+from alignment.estimate.motion import motion_between, motion_rows
 from alignment.estimate.patches import Patches
 from planner.frames import Array, Transform
+from planner.surface.closest import Foot
 from planner.surface.curved import CurvedSurface
+from planner.surface.follow import Follower
 
 # A beam this far off the normal meets another surface, or none.
 FACING_COS = np.cos(np.radians(45.0))
+# Within so small a motion (mm) residuals change linearly: what is left out is 0.5 * curvature * motion^2, 1e-6 mm at a
+# radius of 10 mm.
+LINEAR_MM = 5e-3
+# How well residuals found by following feet have to agree with those found afresh (mm).
+FOLLOWED_MM = 1e-4
+# Placements whose residuals are remembered.
+REMEMBERED = 4
 
 
 @dataclass(frozen=True, eq=False)
@@ -26,6 +35,37 @@ class Rows:
     valid: NDArray[np.bool_]
     foot_base: Array
     normal_base: Array
+
+
+class Track:
+    """The residuals of the same n readings or patches at one placement after another. Arguments as of `distance_rows`."""
+
+    def __init__(
+        self,
+        curved: CurvedSurface,
+        origins_base: Array,
+        distance_mm: Array,
+        beams_base: Array | None,
+        follower: Follower | None = None,
+    ) -> None:
+        self.origins_base, self.distance_mm, self.beams_base = origins_base, distance_mm, beams_base
+        self.follower = Follower(curved) if follower is None else follower
+        self._reach_mm = float(np.ptp(origins_base, axis=0).max(initial=0.0))
+        self._known: list[tuple[Transform, Array, Rows]] = []
+
+    def rows(self, T_base_part: Transform, centre_mm: Array) -> Rows:
+        """Return the residuals at a placement, motions about `centre_mm`; linear from a known one if that is very near."""
+        for T_known, centre_known, rows in reversed(self._known):
+            turned = np.abs(T_base_part.rotation_matrix - T_known.rotation_matrix).max()
+            if self._reach_mm * turned > LINEAR_MM:
+                continue
+            xi = motion_between(T_known, T_base_part, centre_known)
+            if np.linalg.norm(xi[3:]) + self._reach_mm * np.linalg.norm(xi[:3]) < LINEAR_MM:
+                return replace(rows, r=rows.r + rows.jacobian @ xi)
+        foot = self.follower.closest(T_base_part.inv().points(self.origins_base))
+        found = _rows_at(foot, T_base_part, centre_mm, self.distance_mm, self.beams_base)
+        self._known = [*self._known[1 - REMEMBERED :], (T_base_part, centre_mm, found)]
+        return found
 
 
 def distance_rows(
@@ -43,6 +83,12 @@ def distance_rows(
     feet whose normal does not face the beam.
     """
     foot = curved.closest(T_base_part.inv().points(origins_base))
+    return _rows_at(foot, T_base_part, centre_mm, distance_mm, beams_base)
+
+
+def _rows_at(
+    foot: Foot, T_base_part: Transform, centre_mm: Array, distance_mm: Array, beams_base: Array | None
+) -> Rows:
     normal = T_base_part.directions(foot.normals)
     point = T_base_part.points(foot.points)
     valid = foot.interior.copy()
@@ -52,9 +98,22 @@ def distance_rows(
     return Rows(distance_mm - foot.distance_mm, motion_rows(point, normal, centre_mm), valid, point, normal)
 
 
+def same_afresh(patches: Patches, curved: CurvedSurface, T_base_part: Transform, rows: Rows) -> bool:
+    """Return whether the residuals of patches are those that the whole surface gives, looked at afresh."""
+    if not curved.triangles.is_fine:
+        return True
+    foot = curved.closest(T_base_part.inv().points(patches.origins_base))
+    r = patches.distance_mm - patches.bend_mm - foot.distance_mm
+    return not bool((rows.valid & (np.abs(r - rows.r) > FOLLOWED_MM)).any())
+
+
 def patch_rows(patches: Patches, curved: CurvedSurface, T_base_part: Transform, centre_mm: Array) -> Rows:
     """Return the residuals of patches; those without a usable reading are not valid."""
-    rows = distance_rows(
-        curved, T_base_part, centre_mm, patches.origins_base, patches.distance_mm - patches.bend_mm, patches.beams_base
-    )
-    return Rows(rows.r, rows.jacobian, rows.valid & (patches.count > 0), rows.foot_base, rows.normal_base)
+    track = patches.tracks.get(id(curved))
+    if track is None:
+        follower = patches.follower if patches.follower is not None and patches.follower.curved is curved else None
+        expected_mm = patches.distance_mm - patches.bend_mm
+        track = Track(curved, patches.origins_base, expected_mm, patches.beams_base, follower)
+        patches.tracks[id(curved)] = track
+    rows = track.rows(T_base_part, centre_mm)
+    return replace(rows, valid=rows.valid & (patches.count > 0))

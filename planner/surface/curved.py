@@ -2,7 +2,6 @@
 
 from functools import cached_property
 
-import igl
 import numpy as np
 from numpy.typing import NDArray
 
@@ -10,16 +9,19 @@ from planner.frames import Array
 from planner.setup import Probe
 from planner.surface.closest import Foot
 from planner.surface.inspection import InspectionSurface
+from planner.surface.nearest import Triangles
 from planner.surface.normals import unit
 from planner.surface.patch import pn_normals, pn_points
 from planner.surface.rays import Scene
-from planner.surface.topology import edges_of, weld, weld_tolerance_mm
+from planner.surface.topology import Edges, edges_of, weld, weld_tolerance_mm
 from planner.surface.vertex_fit import VertexFit, fit_vertices
 
 # Share of the area whose worst triangle gives the angle error.
 COVERED = 0.9999
 FOOT_STEPS = 6
 FOOT_TOLERANCE_MM = 1e-5
+# Triangles a step along a fine mesh may cross before the nearest one is asked for instead.
+WALK = 12
 
 
 def footprint_mm(probe: Probe) -> float:
@@ -54,19 +56,21 @@ class CurvedSurface:
         self.vertex_fit = VertexFit(points, fit.normals[w], fit.shape[w], fit.exact)
 
     @cached_property
-    def _tree(self) -> igl.AABB:
-        tree = igl.AABB()
-        tree.init(self._vertices, self._faces)
-        return tree
+    def triangles(self) -> Triangles:
+        """The triangles, ready to be asked which is nearest."""
+        return Triangles(self._vertices, self._faces)
 
     @cached_property
-    def _boundary(self) -> tuple[NDArray[np.bool_], NDArray[np.bool_]]:
-        """Faces' edges on the boundary (f, 3), opposite corner k, and faces' corners on it (f, 3)."""
-        edges = edges_of(self._welded_faces)
-        at_edge = edges.is_boundary[edges.of_face]
+    def _edges(self) -> Edges:
+        return edges_of(self._welded_faces)
+
+    @cached_property
+    def _at_rim(self) -> NDArray[np.bool_]:
+        """Welded vertices on the boundary (w,)."""
+        edges = self._edges
         on = np.zeros(int(self._welded.max()) + 1, dtype=bool)
         on[edges.vertices[edges.is_boundary].ravel()] = True
-        return at_edge, on[self._welded_faces]
+        return on
 
     def evaluate(self, face: NDArray, bary: Array) -> tuple[Array, Array]:
         """Return points (n, 3) and unit outward normals (n, 3) at barycentrics of faces."""
@@ -87,8 +91,10 @@ class CurvedSurface:
 
     def shape_operator(self, face: NDArray, bary: Array) -> Array:
         """Return symmetric W (n, 3, 3), 1/mm, with dn = W dp for steps along the surface; a sphere has +1/R."""
+        return self._shape(face, bary, self.normals(face, bary))
+
+    def _shape(self, face: NDArray, bary: Array, normal: Array) -> Array:
         blended = np.einsum("nk,nkij->nij", bary, self.vertex_fit.shape[self._faces[face]])
-        normal = self.normals(face, bary)
         into = np.einsum("nij,nj->ni", blended, normal)
         twice = np.einsum("ni,ni->n", into, normal)
         mixed = np.einsum("ni,nj->nij", normal, into - 0.5 * twice[:, None] * normal)
@@ -97,45 +103,71 @@ class CurvedSurface:
     def closest(self, points_part: Array) -> Foot:
         """Return the feet of points (n, 3): closest on the triangles, then moved until the offset is along the normal."""
         query = np.ascontiguousarray(points_part, dtype=np.float64).reshape(-1, 3)
-        face, bary = self._on_triangles(query)
+        near = self.triangles.nearest(query)
+        return self.foot_from(query, near.face, near.bary)[0]
+
+    def foot_from(self, query: Array, face: NDArray[np.int32], bary: Array) -> tuple[Foot, NDArray[np.bool_]]:
+        """Return the feet of points (n, 3) that steps from places on faces lead to, and which steps died out (n,)."""
+        face, bary = face.copy(), bary.copy()
         points, normals = self.evaluate(face, bary)
         active = np.arange(len(query))
         for _ in range(FOOT_STEPS):
             step = self._foot_step(query[active], face[active], bary[active], points[active], normals[active])
-            far = np.linalg.norm(step, axis=1) > FOOT_TOLERANCE_MM
+            far = np.einsum("ij,ij->i", step, step) > FOOT_TOLERANCE_MM**2
             active, step = active[far], step[far]
             if not len(active):
                 break
-            # Most steps stay inside their triangle; only those that leave it need a search.
-            at = points[active] + step
-            bary[active] = self._barycentric(face[active], at)
-            left = (bary[active] < 0.0).any(axis=1)
-            face[active[left]], bary[active[left]] = self._on_triangles(at[left])
+            # Most steps stay inside their triangle; only those that leave it need a search. The curved point stands beside
+            # the flat one of the same barycentrics, so it is the step that is taken over, not where it leads.
+            bary[active] += self.triangles.barycentric_step(face[active], step)
+            left = active[(bary[active] < 0.0).any(axis=1)]
+            face[left], bary[left] = self._onto(face[left], bary[left])
             points[active], normals[active] = self.evaluate(face[active], bary[active])
-        return self._foot(query, face, bary, points, normals)
+        settled = np.ones(len(query), dtype=bool)
+        settled[active] = False
+        return self._foot(query, face, bary, points, normals), settled
 
-    def _on_triangles(self, query: Array) -> tuple[NDArray[np.int32], Array]:
-        _, face, at = self._tree.squared_distance(self._vertices, self._faces, query)
-        bary = np.clip(self._barycentric(face, at), 0.0, 1.0)
-        return face.astype(np.int32), bary / bary.sum(axis=1, keepdims=True)
+    def _onto(self, face: NDArray[np.int32], bary: Array) -> tuple[NDArray[np.int32], Array]:
+        """Return the faces and barycentrics of places in the planes of faces (n,), outside of them."""
+        face, bary = face.copy(), bary.copy()
+        at = np.einsum("nk,nkj->nj", bary, self._vertices[self._faces[face]])
+        lost = self._walk(at, face, bary) if self.triangles.is_fine else np.ones(len(at), dtype=bool)
+        if lost.any():
+            near = self.triangles.nearest(at[lost])
+            face[lost], bary[lost] = near.face, near.bary
+        return face, bary
 
-    def _barycentric(self, face: NDArray, at: Array) -> Array:
-        """Return barycentrics (n, 3) of points over the planes of faces; negative outside of the triangle."""
-        a, b, c = (self._vertices[self._faces[face, k]] for k in range(3))
-        u, v, w = b - a, c - a, at - a
-        uu, uv, vv, wu, wv = (np.einsum("ij,ij->i", p, q) for p, q in ((u, u), (u, v), (v, v), (w, u), (w, v)))
-        det = uu * vv - uv * uv
-        det = np.where(det > 0, det, 1.0)
-        bary = np.stack([np.zeros_like(det), (vv * wu - uv * wv) / det, (uu * wv - uv * wu) / det], axis=1)
-        bary[:, 0] = 1.0 - bary[:, 1] - bary[:, 2]
-        return bary
+    def _walk(self, at: Array, face: NDArray[np.int32], bary: Array) -> NDArray[np.bool_]:
+        """Walk in place to the faces that points (n, 3) stand over, across one edge at a time; return who met a rim (n,).
+
+        A point of the surface is nearest to the triangle it stands over, but for another sheet within the chord error.
+        """
+        lost = np.zeros(len(at), dtype=bool)
+        walking = np.arange(len(at))
+        for _ in range(WALK):
+            walking = walking[(bary[walking] < 0.0).any(axis=1)]
+            if not len(walking):
+                return lost
+            onward = self._beyond(face[walking], np.argmin(bary[walking], axis=1))
+            lost[walking[onward < 0]] = True
+            walking, onward = walking[onward >= 0], onward[onward >= 0]
+            face[walking] = onward
+            bary[walking] = self.triangles.barycentric(onward, at[walking])
+        lost[walking[(bary[walking] < 0.0).any(axis=1)]] = True
+        return lost
+
+    def _beyond(self, face: NDArray, k: NDArray) -> NDArray[np.int64]:
+        """Return the faces on the other side of faces' edges opposite corners k (n,); -1 where there is none, or two."""
+        edges = self._edges
+        edge = edges.of_face[face, k]
+        return np.where(edges.uses[edge] == 2, edges.first[edge] + edges.second[edge] - face, -1)
 
     def _foot_step(self, query: Array, face: NDArray, bary: Array, points: Array, normals: Array) -> Array:
         """Return the Newton step (n, 3) along the surface that makes query - foot parallel to the normal."""
         offset = query - points
         height = np.einsum("ij,ij->i", offset, normals)
         along = offset - height[:, None] * normals
-        turned = height[:, None, None] * self.shape_operator(face, bary)
+        turned = height[:, None, None] * self._shape(face, bary, normals)
         # In the tangent plane A = 1 + h W is 2 x 2: its inverse is (tr A - A) / det A (Cayley and Hamilton).
         trace = np.einsum("nii->n", turned)
         det = 1.0 + trace + 0.5 * (trace**2 - np.einsum("nij,nij->n", turned, turned))
@@ -151,8 +183,9 @@ class CurvedSurface:
         height = np.einsum("ij,ij->i", offset, normals)
         length = np.linalg.norm(offset, axis=1)
         along = np.sqrt(np.maximum(length**2 - height**2, 0.0))
-        at_edge, at_corner = self._boundary
-        out = ((bary < 1e-9) & at_edge[face]).any(axis=1) | ((bary > 1 - 1e-9) & at_corner[face]).any(axis=1)
+        at_edge = self._edges.uses[self._edges.of_face[face]] == 1
+        at_corner = self._at_rim[self._welded_faces[face]]
+        out = ((bary < 1e-9) & at_edge).any(axis=1) | ((bary > 1 - 1e-9) & at_corner).any(axis=1)
         beside = out & (along > 1e-3 + 1e-3 * np.abs(height))
         distance = np.where(beside, np.where(height < 0, -length, length), height)
         return Foot(points, normals, distance, face, bary, ~beside)
@@ -172,12 +205,13 @@ class CurvedSurface:
         o, d, f = origins[hit], directions[hit], face[hit]
         plane = self.surface.face_normals[f]
         reach = np.einsum("ij,ij->i", self._vertices[self._faces[f, 0]] - o, plane) / np.einsum("ij,ij->i", d, plane)
-        b = np.clip(self._barycentric(f, o + reach[:, None] * d), 0.0, 1.0)
+        b = np.clip(self.triangles.barycentric(f, o + reach[:, None] * d), 0.0, 1.0)
         b /= b.sum(axis=1, keepdims=True)
         for _ in range(2):
             p, n = self.evaluate(f, b)
             reach = np.einsum("ij,ij->i", p - o, n) / np.einsum("ij,ij->i", d, n)
-            f, b = self._on_triangles(o + reach[:, None] * d)
+            near = self.triangles.nearest(o + reach[:, None] * d)
+            f, b = near.face, near.bary
         face[hit], bary[hit], t[hit] = f, b, reach
         return face, bary, t
 

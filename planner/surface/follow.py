@@ -19,11 +19,12 @@ class Follower:
     """Remembers the feet of n points; `closest` gives what `CurvedSurface.closest` gives, to its own tolerance.
 
     A foot is followed only while its point stays within the margin in which the nearest triangle is known to lie among
-    those already looked at (`planner.surface.nearest`); elsewhere the whole surface is asked again.
+    those already looked at (`planner.surface.nearest`); elsewhere the whole surface is asked again. loose: feet are
+    followed however far they go; for searches whose end is looked at anew.
     """
 
-    def __init__(self, curved: CurvedSurface) -> None:
-        self.curved = curved
+    def __init__(self, curved: CurvedSurface, loose: bool = False) -> None:
+        self.curved, self.loose = curved, loose
         self._known: dict[str, Any] | None = None
 
     def closest(self, points_part: Array) -> Foot:
@@ -86,7 +87,7 @@ class Follower:
             stretch = 1.0 + np.minimum(foot.distance_mm * (half - spread), foot.distance_mm * (half + spread))
             sole &= stretch > LEAST_STRETCH
         self._known["at"][rows] = asked
-        self._known["margin_mm"][rows] = np.where(sole, near.margin_mm, 0.0)
+        self._known["margin_mm"][rows] = np.where(sole, np.inf if self.loose else near.margin_mm, 0.0)
         return foot
 
 

@@ -53,8 +53,8 @@ class InspectionSurface:
     @cached_property
     def centroid_part(self) -> Array:
         """Area centroid (3,), mm."""
-        centres = self.vertices[self.faces].mean(axis=1)
-        return np.asarray(np.average(centres, axis=0, weights=self.face_areas_mm2))
+        share = self.face_areas_mm2 / self.area_mm2
+        return np.asarray(sum((share @ self.vertices[corner] for corner in self.faces.T), np.zeros(3)) / 3.0)
 
     @cached_property
     def mean_normal_part(self) -> Array:
