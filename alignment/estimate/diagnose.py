@@ -59,9 +59,8 @@ def diagnose_fit(cloud: PointCloud, problem: Problem, found: MapFit) -> list[Iss
     lost = sigma > SUSPICIOUS_MM or share < SUSPICIOUS_SHARE
     if lost or _beyond_limits(found, problem):
         hypotheses += place_hypotheses(problem.setup)
-    own = _own_scatter(cloud, problem)
     # Of a part that sprang back the careful fit may leave more than the quick one: what counts is what fits at all.
-    scatter = own if np.isfinite(own) else sigma
+    scatter = found.captured.scatter_mm if found.captured.converged else sigma
     better = _best(cloud, problem, scatter, hypotheses, _beyond_limits(found, problem))
     if better is not None:
         # A scan that fits as it stands, only far from nominal, may be just that: two readings of it are possible, and
@@ -87,12 +86,6 @@ def diagnose_fit(cloud: PointCloud, problem: Problem, found: MapFit) -> list[Iss
 def _beyond_limits(found: MapFit, problem: Problem) -> bool:
     total = np.abs(problem.total(found.T_base_part))
     return bool(total.max() > 3.0)
-
-
-def _own_scatter(cloud: PointCloud, problem: Problem) -> float:
-    """Return the scatter (mm) of a sample about the given reading of the scan, judged as the others are."""
-    found = capture(thinned(cloud, SAMPLE), problem)
-    return found.scatter_mm if found.converged else np.inf
 
 
 def _best(

@@ -16,6 +16,7 @@ from scipy.stats import norm, qmc
 
 from alignment.estimate.noise_kernel import NAMES, Kernel
 from alignment.estimate.noise_rows import NoiseRows
+from alignment.estimate.side_by_side import side_by_side
 from planner.frames import Array
 
 DRAWS = 128
@@ -93,11 +94,18 @@ def fit_noise(rows: NoiseRows, prior: NoisePrior, draws: int = DRAWS) -> NoiseFi
     side = np.where(unit >= 0.0, stretch[0], stretch[1])
     samples = np.tile(theta, (draws, 1))
     samples[:, active] += PROPOSAL_WIDTH * (unit * side) @ root.T
-    log_weight, whitened = np.full(draws, -np.inf), []
-    for i, sample in enumerate(samples):
-        found = _at(kernel, rows, prior, sample)
-        whitened.append(None if found is None else (found.xw, whiten_back(found.lower, found.xw)))
-        log_weight[i] = -np.inf if found is None else found.value
+    log_weight = np.full(draws, -np.inf)
+    whitened: list[tuple[Array, Array] | None] = [None] * draws
+
+    def look(picked: range) -> None:
+        own = kernel.twin()
+        for i in picked:
+            found = _at(own, rows, prior, samples[i])
+            if found is not None:
+                whitened[i] = (found.xw, whiten_back(found.lower, found.xw))
+                log_weight[i] = found.value
+
+    side_by_side(look, [range(0, draws, 2), range(1, draws, 2)])
     log_weight += (0.5 * unit**2 + np.log(side)).sum(axis=1)
     weights = np.exp(log_weight - log_weight.max())
     weights /= weights.sum()

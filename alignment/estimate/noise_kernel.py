@@ -10,7 +10,6 @@ from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.spatial.distance import pdist, squareform
 
 from alignment.estimate.noise_rows import NoiseRows
@@ -85,11 +84,11 @@ class Kernel:
             out += [EDGE_NUGGET, EDGE_PATH]
         return tuple(sorted(out))
 
-    @cached_property
-    def _block_pair(self) -> NDArray[np.intp]:
-        """Where the blocks of two rows stand in a flattened table of blocks (n, n)."""
-        block = self.rows.block.astype(np.intp)
-        return block[:, None] * len(self.rows.block_from_mm) + block[None, :]
+    def twin(self) -> "Kernel":
+        """Return the same kernel with room of its own to work in, for another thread."""
+        other = Kernel(self.rows)
+        other.__dict__.update({name: value for name, value in self.__dict__.items() if name != "_room"})
+        return other
 
     @cached_property
     def _room(self) -> tuple[Array, Array, Array]:
@@ -108,8 +107,8 @@ class Kernel:
         c *= mean[:, None]
         c *= mean
         np.fill_diagonal(c, own)
-        # Every index is one of the table's: "clip" only says that no copy is needed to be safe.
-        return c.take(self._block_pair, out=out, mode="clip")
+        # Columns first: then whole rows are copied. ("clip" only says that no index can be wrong.)
+        return c.take(self.rows.block, axis=1).take(self.rows.block, axis=0, out=out, mode="clip")
 
     def field_correlation(self, length_mm: float, out: Array | None = None) -> Array:
         """Return the correlation (n, n) of the form error; edges measure something else."""

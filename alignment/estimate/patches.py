@@ -10,6 +10,7 @@ from scipy.sparse import csc_array
 from alignment.cloud import PointCloud
 from alignment.estimate.cells import Cells
 from alignment.estimate.robust import mad_sigma, tukey_weights
+from alignment.estimate.side_by_side import sum_of_slices
 from planner.frames import Array, Transform
 from planner.surface.curved import CurvedSurface
 from planner.surface.follow import Follower
@@ -18,8 +19,6 @@ from planner.surface.follow import Follower
 SORTED_READINGS = 150_000
 # Below this share of the usual amplitude a reading counts less: half the beam may be off the part.
 FULL_AMPLITUDE = 0.6
-# Readings worked on at a time.
-SLICE = 32_768
 EVERY = slice(None)
 # The six entries of a symmetric matrix.
 PAIRS = np.triu_indices(3)
@@ -112,10 +111,12 @@ def condense(
     are taken a slice at a time, so that what is worked out of them stays in the processor's cache.
     """
     cell, c = cells.of_reading, len(cells)
-    total = np.zeros((c, 4))
-    for rows in _slices(len(cloud)):
+
+    def sums(rows: slice) -> Array:
         origins, _ = model_readings(cloud, point_model, rows)
-        total += _sums(cell[rows], c, np.vstack([origins.T, np.ones(len(origins))]))
+        return _sums(cell[rows], c, np.vstack([origins.T, np.ones(len(origins))]))
+
+    total = sum_of_slices(sums, len(cloud), (c, 4))
     middle = total[:, :3] / np.maximum(total[:, 3:], 1.0)
     follower = Follower(curved, loose=True)
     foot = follower.closest(T_base_part.inv().points(middle))
@@ -125,7 +126,8 @@ def condense(
     gradient = T_base_part.directions(foot.normals).T.copy()
     curved_by = (hessian * np.where(np.eye(3, dtype=bool), 0.5, 1.0)).transpose(1, 2, 0).copy()
     residual = np.zeros(len(cloud))
-    for rows in _slices(len(cloud)):
+
+    def residuals(rows: slice) -> Array:
         at = cell[rows]
         origins, distance = model_readings(cloud, point_model, rows)
         d = [origins[:, k] - middle[:, k].take(at) for k in range(3)]
@@ -136,6 +138,9 @@ def condense(
                 slope += curved_by[i, j].take(at) * d[j]
             left -= slope * d[i]
         residual[rows] = left
+        return np.zeros(0)
+
+    sum_of_slices(residuals, len(cloud), (0,))
     weight, sigma = _robust(residual, reading_weights(cloud), cell, c)
     return _weighted(cloud, cells, middle, residual, weight, sigma, hessian, follower, point_model)
 
@@ -153,8 +158,8 @@ def _weighted(
 ) -> Patches:
     """Return the patches as the weighted means of their readings."""
     cell, c = cells.of_reading, len(cells)
-    sums = np.zeros((c, 18))
-    for rows in _slices(len(cloud)):
+
+    def moments(rows: slice) -> Array:
         at, w = cell[rows], weight[rows]
         origins, distance = model_readings(cloud, point_model, rows)
         x = np.zeros((18, len(at)))
@@ -168,7 +173,9 @@ def _weighted(
             x[13:16] = cloud.beams_base[rows].T
         x[16], x[17] = 1.0, w
         x *= w
-        sums += _sums(at, c, x)
+        return _sums(at, c, x)
+
+    sums = sum_of_slices(moments, len(cloud), (c, 18))
     total, squares = sums[:, 16], sums[:, 17]
     mean = sums / np.where(total > 0, total, 1.0)[:, None]
     offset, centre = mean[:, :3], mean[:, 9]
@@ -191,10 +198,6 @@ def _weighted(
         sigma_mm,
         follower,
     )
-
-
-def _slices(n: int) -> list[slice]:
-    return [slice(i, min(i + SLICE, n)) for i in range(0, n, SLICE)]
 
 
 def _sums(cell: NDArray[np.int32], c: int, x: Array) -> Array:
@@ -235,12 +238,14 @@ def _robust(residual: Array, weight: Array, cell: NDArray[np.int32], c: int) -> 
     inside = residual[look][many] - centre[cell[look]][many]
     sigma = mad_sigma(inside, 1e-4, about_zero=True)
     out = np.zeros(n)
+
+    def weigh(rows: slice) -> Array:
+        at, r = cell[rows], residual[rows]
+        w = weight[rows] * tukey_weights(r - centre.take(at), 1.2 * sigma)
+        out[rows] = w
+        return _sums(at, c, np.stack([w, w * r]))
+
     for _ in range(2):
-        sums = np.zeros((c, 2))
-        for rows in _slices(n):
-            at, r = cell[rows], residual[rows]
-            w = weight[rows] * tukey_weights(r - centre.take(at), 1.2 * sigma)
-            out[rows] = w
-            sums += _sums(at, c, np.stack([w, w * r]))
+        sums = sum_of_slices(weigh, n, (c, 2))
         centre = np.where(sums[:, 0] > 0, sums[:, 1] / np.where(sums[:, 0] > 0, sums[:, 0], 1.0), centre)
     return out, sigma
