@@ -16,7 +16,7 @@ from planner.path.passes import DataRuns, assemble, headings
 from planner.path.raster_geodesic import geodesic_cut
 from planner.path.raster_plane import plane_cut
 from planner.path.tracks import Tracks, split_at_turns, tracks
-from planner.path.travel import along_track
+from planner.path.travel import along_track, smoothed
 from planner.setup import Setup
 from planner.surface.curved import CurvedSurface
 from planner.toolpath import ToolPath
@@ -65,6 +65,9 @@ def raster(curved: CurvedSurface, setup: Setup) -> ToolPath:
     face, bary = cut.on_surface(track.face, track.bary)
     points, normals = curved.evaluate(face, bary)
     across = cut.across(track.face, normals)
+    if not cut.exact:
+        aside = smoothed(track, points, across, spacing)
+        face, bary, points, normals = _moved(curved, face, bary, points, aside[:, None] * across)
     travel = _travel(track, points, normals, across, spacing, cut.exact)
     data = DataRuns(
         points,
@@ -83,6 +86,28 @@ def acquisition_spacing_mm(setup: Setup) -> float:
     """Return the spacing of dense poses: `point_spacing_mm`, or an integer part of it up to `GEOMETRY_SPACING_MM`."""
     asked = setup.inspection.point_spacing_mm
     return asked / float(np.ceil(asked / GEOMETRY_SPACING_MM - 1e-9))
+
+
+def _moved(
+    curved: CurvedSurface, face: NDArray[np.int32], bary: Array, points: Array, shift: Array
+) -> tuple[NDArray[np.int32], Array, Array, Array]:
+    """Return faces, barycentrics, points and normals (n, ...) of points of the surface moved along it by a little."""
+    corner = curved.surface.vertices[curved.surface.faces[face]]
+    u, v = corner[:, 1] - corner[:, 0], corner[:, 2] - corner[:, 0]
+    uu, uv, vv = (np.einsum("ij,ij->i", a, b) for a, b in ((u, u), (u, v), (v, v)))
+    su, sv = (np.einsum("ij,ij->i", shift, a) for a in (u, v))
+    det = uu * vv - uv * uv
+    sound = det > 1e-12 * uu * vv
+    det = np.where(sound, det, 1.0)
+    db, dc = (vv * su - uv * sv) / det, (uu * sv - uv * su) / det
+    new = bary + np.stack([-db - dc, db, dc], axis=1)
+    inside = sound & (new.min(axis=1) >= 0.0)
+    face, bary = face.copy(), np.where(inside[:, None], new, bary)
+    left = np.flatnonzero(~inside & (np.abs(shift).max(axis=1) > 0.0))
+    if len(left):
+        foot = curved.closest(points[left] + shift[left])
+        face[left], bary[left] = foot.face, foot.bary
+    return face, bary, *curved.evaluate(face, bary)
 
 
 def _sharp(track: Tracks, face_normals: Array, spacing: float) -> NDArray[np.bool_]:
