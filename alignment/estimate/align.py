@@ -12,8 +12,10 @@ from alignment.estimate.capture import Captured
 from alignment.estimate.diagnose import diagnose_fit, diagnose_lost, floor_issues, temperature_issue
 from alignment.estimate.directions import directions, named_statuses
 from alignment.estimate.keypoint_method import KeyPointFit, KeyPointMatch, align_keypoints, match_keypoints
+from alignment.estimate.locks import lock_issues
 from alignment.estimate.map import align_map, condense_cloud
 from alignment.estimate.motion import motion_rows, named_axes
+from alignment.estimate.outlook import after_correction
 from alignment.estimate.patches import Patches
 from alignment.estimate.problem import Problem
 from alignment.estimate.robust import mad_sigma
@@ -23,7 +25,6 @@ from alignment.metrics import expected
 from planner.frames import Array, Transform
 from planner.issues import Issue
 from planner.keypoint import KeyPoint
-from planner.placement import assume_nominal
 from planner.setup import Setup
 from planner.surface.curved import CurvedSurface
 from planner.toolpath import ToolPath
@@ -59,7 +60,9 @@ def align(
     if isinstance(found, Captured):
         return _nothing(cloud, problem, baseline, found, method)
     issues = [*cloud.issues, *diagnose_fit(cloud, problem, found)]
-    if not found.converged:
+    strained = lock_issues(found.strain, found.converged, setup.tolerances)
+    issues += strained
+    if not found.converged and not strained:
         issues.append(
             Issue(
                 "error", "no-convergence", "the estimate did not settle.", "Scan more of the surface, and closer to it."
@@ -97,7 +100,10 @@ def _finish(
         issues.append(_too_few(residual.readings))
     shift_mm, turn_deg = nominal_shift(setup, T_base_part, curved.surface.centroid_part)
     issues += limit_issues(shift_mm, turn_deg, setup)
-    issues += residual_issues(residual.rms_mm, setup)
+    said = residual_issues(residual.rms_mm, setup)
+    # Of readings that a lock keeps off the part nothing follows for the part's shape.
+    locked_out = any(i.code == "lock-contradicted" for i in issues)
+    issues += [i for i in said if i.severity == "error" or not locked_out]
     issues += direction_issues(found, curved, inspection, setup, centre, T_base_part)
     issues += temperature_issue(setup)
     issues += floor_issues(problem)
@@ -107,7 +113,7 @@ def _finish(
     before = after = None
     if inspection is not None:
         before = expected(curved, inspection, setup, T_base_part).summary
-        after = expected(curved, inspection, setup, assume_nominal(setup.T_base_partnom)).summary
+        after = after_correction(curved, inspection, setup, T_base_part, covariance)
     picked = np.flatnonzero(used)
     return Correction(
         method=method,

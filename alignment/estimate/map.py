@@ -12,6 +12,7 @@ from alignment.estimate.cells import cells_along_passes, cells_in_space
 from alignment.estimate.directions import Direction, directions, held_basis
 from alignment.estimate.edge_points import edge_points, locate
 from alignment.estimate.edge_rows import EdgeMap
+from alignment.estimate.locks import LockStrain, lock_strain
 from alignment.estimate.mixture import Mixture, Posterior, mixture, solve
 from alignment.estimate.noise_fit import NoiseFit, fit_noise, noise_prior
 from alignment.estimate.patches import Patches, condense
@@ -47,6 +48,7 @@ class MapFit:
 
     covariance (6, 6): of xi = (rx, ry, rz, x, y, z), rad and mm, axes of base, about `centre_mm`, held directions at their
     prior. rows: residuals of `patches`; used (p,): those the estimate rests on. edges: what the crossings say, or None.
+    strain: what the readings say of the locked axes.
     """
 
     T_base_part: Transform
@@ -60,6 +62,7 @@ class MapFit:
     captured: Captured
     converged: bool
     edges: dict[str, Any] | None = None
+    strain: LockStrain | None = None
 
 
 @dataclass(frozen=True, eq=False)
@@ -104,10 +107,13 @@ def _fitted(problem: Problem, captured: Captured, patches: Patches, crossed: Edg
     noise = fit_noise(rows, noise_prior(patches.sigma_mm, size, setup.probe.swath_mm))
     mix = mixture(rows, noise, FEW)
     state, _ = _settle(state, system, mix, np.zeros((6, 0)))
+    strain = None
     for i in range(ROUNDS):
         T = state.T_base_part
         mix = mixture(system.rows(T, state.nuisance), noise, FEW if i < ROUNDS - 1 else None)
         free = _solve(state, system, mix, np.zeros((6, 0)))
+        # Only now is nothing held: afterwards the locked axes stand where the lock says.
+        strain = lock_strain(problem, T, free.covariance[:6, :6]) if i == 0 else strain
         held = held_basis(free.covariance[:6, :6], problem.lock_rows(T))
         state, converged = _settle(state, system, mix, held)
     state = _plain_if_sprung(state, system, robust.T_base_part, held)
@@ -119,7 +125,7 @@ def _fitted(problem: Problem, captured: Captured, patches: Patches, crossed: Edg
     now = system.surface(T)
     return MapFit(
         T, problem.centre_mm(T), covariance * np.outer(scale, scale), found, patches, now, robust.used & now.valid,
-        noise, captured, robust.settled and converged, _edge_report(state, system, post),
+        noise, captured, robust.settled and converged, _edge_report(state, system, post), strain,
     )  # fmt: skip
 
 

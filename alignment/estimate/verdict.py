@@ -17,6 +17,8 @@ from planner.toolpath import ToolPath
 MOST_POSES = 4000
 # A direction is judged by this many of its standard deviations.
 SIGMAS = 2.0
+# What the operator must accept, by parts of the issues' codes.
+PARTIAL = ("not-rigid", "harmful", "lock-contradicted")
 
 
 def limit_issues(centroid_shift_mm: float, turn_deg: float, setup: Setup) -> list[Issue]:
@@ -54,7 +56,7 @@ def residual_issues(rms_mm: float, setup: Setup) -> list[Issue]:
                 "residual-large",
                 f"the readings stand {rms_mm:.2f} mm rms off the placed part, beyond tolerances.standoff_mm "
                 f"({t.standoff_mm:g} mm).",
-                "Check part, unit and scan; if the part has sprung back this far, align with --non-rigid.",
+                "Check part, unit and scan; if the part has sprung back this far, run the alignment as non-rigid.",
             )
         ]
     if rms_mm > 3.0 * t.position_mm:
@@ -64,7 +66,7 @@ def residual_issues(rms_mm: float, setup: Setup) -> list[Issue]:
                 "not-rigid",
                 f"the readings stand {rms_mm:.2f} mm rms off the placed part, beyond three times "
                 f"tolerances.position_mm ({t.position_mm:g} mm): the part differs from its CAD.",
-                "Align with --non-rigid to follow its shape.",
+                "Run the alignment as non-rigid to follow its shape.",
             )
         ]
     return []
@@ -196,7 +198,7 @@ def _axis_words(v: Array) -> str:
     return "({:.2f}, {:.2f}, {:.2f})".format(*(unit * np.sign(unit[k])))
 
 
-def verdict_of(issues: Sequence[Issue], partial_codes: Sequence[str] = ("not-rigid", "harmful")) -> str:
+def verdict_of(issues: Sequence[Issue], partial_codes: Sequence[str] = PARTIAL) -> str:
     """Return fail on any error, partial on what the operator must accept, else pass."""
     if errors_in(issues):
         return "fail"
