@@ -50,6 +50,11 @@ class Plan:
         """The smooth surface behind the triangles."""
         return CurvedSurface(self.surface, footprint_mm(self.setup.probe))
 
+    def with_curved(self, curved: CurvedSurface) -> "Plan":
+        """Return this plan with the smooth surface it was made on, which is slow to make on a large part."""
+        self.__dict__["curved"] = curved
+        return self
+
 
 def plan_artifacts(plan: Plan) -> Artifacts:
     """Return plan.json, plan.npz, setup.json and keypoints.json."""

@@ -12,6 +12,7 @@ from app.plan import Artifacts, Plan, plan_artifacts
 from app.steps.programs import export_path, program_name
 from planner.cad import read_part
 from planner.checks import check
+from planner.checks.orientation import orientation_issues
 from planner.checks.regions import region_issues
 from planner.errors import EchoBaseError
 from planner.issues import Issue, errors_in
@@ -31,6 +32,8 @@ from planner.toolpath import ToolPath
 
 Progress = Callable[[float, str], None]
 SUGGESTED_SHARE = (0.10, 0.30)
+FEWEST_PASSES = 3
+"""Passes, each as long as the swath, below which an alignment scan cannot be cut."""
 
 
 @dataclass(frozen=True)
@@ -64,7 +67,7 @@ def run_plan(request: PlanRequest, progress: Progress) -> tuple[Plan, Artifacts]
     if refused:
         raise EchoBaseError(*refused)
     issues = [*facing_issues(surface, up_part), *clip_issues(surface), *region_issues(curved, setup)]
-    issues += verdicts(curved, keypoints, setup)
+    issues += [*orientation_issues(curved, setup), *verdicts(curved, keypoints, setup)]
     progress(0.5, "laying the alignment path")
     alignment = alignment_path(curved, keypoints, setup)
     progress(0.6, "laying the inspection raster")
@@ -72,7 +75,7 @@ def run_plan(request: PlanRequest, progress: Progress) -> tuple[Plan, Artifacts]
     progress(0.7, "measuring coverage")
     covered = {p.kind: coverage(curved, p, setup) for p in (alignment, inspection)}
     if not request.keypoints:
-        issues += _coverage_issues(covered["alignment"].swept_share)
+        issues += _coverage_issues(covered["alignment"].swept_share, surface.area_mm2, setup)
     progress(0.75, "predicting the accuracy")
     prediction = predict(alignment, curved, setup)
     summary: dict[str, Any] = {
@@ -84,7 +87,7 @@ def run_plan(request: PlanRequest, progress: Progress) -> tuple[Plan, Artifacts]
         "prediction": prediction.to_json(),
     }
     # The surface's own part: a sheet that faced away from up was turned over.
-    plan = Plan(surface.part, surface, setup, tuple(keypoints), alignment, inspection, summary)
+    plan = Plan(surface.part, surface, setup, tuple(keypoints), alignment, inspection, summary).with_curved(curved)
     programs: Artifacts = {}
     for share, path in ((0.8, alignment), (0.9, inspection)):
         progress(share, f"checking and writing the {path.kind} program")
@@ -92,7 +95,7 @@ def run_plan(request: PlanRequest, progress: Progress) -> tuple[Plan, Artifacts]
         issues += found
         programs |= files
         summary[path.kind] = path_json(path, covered[path.kind]) | record
-    plan = replace(plan, issues=tuple(issues))
+    plan = replace(plan, issues=tuple(issues)).with_curved(curved)
     progress(1.0, "planned")
     return plan, plan_artifacts(plan) | programs
 
@@ -152,16 +155,21 @@ def path_json(path: ToolPath, covered: Coverage) -> dict[str, Any]:
     }
 
 
-def _coverage_issues(share: float) -> list[Issue]:
+def _coverage_issues(share: float, area_mm2: float, setup: Setup) -> list[Issue]:
     low, high = SUGGESTED_SHARE
     if low <= share <= high:
         return []
-    return [
-        Issue(
-            "warning",
-            "coverage-outside",
-            f"the suggested alignment scan covers {share:.0%} of the surface, outside {low:.0%} to {high:.0%}.",
-            "Change alignment.coverage, or pick key points by hand.",
-            "alignment",
-        )
-    ]
+    text = f"the suggested alignment scan covers {share:.0%} of the surface, outside {low:.0%} to {high:.0%}"
+    swath = setup.probe.swath_mm
+    if share > high and area_mm2 * high / swath < FEWEST_PASSES * swath:
+        return [
+            Issue(
+                "info",
+                "coverage-small-part",
+                f"{text}: the surface is small beside the {swath:g} mm swath, and fewer passes would not fix all directions.",
+                "Nothing needs to be done; pick key points by hand for a shorter scan.",
+                "alignment",
+            )
+        ]
+    remedy = "Change alignment.coverage, or pick key points by hand."
+    return [Issue("warning", "coverage-outside", f"{text}.", remedy, "alignment")]

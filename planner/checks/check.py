@@ -10,7 +10,6 @@ from planner.checks.motion import robot_motion
 from planner.checks.path_check import PathCheck
 from planner.checks.say import say_clearance, say_fixture, say_seen
 from planner.checks.say_robot import say_robot
-from planner.checks.solid import solid_of
 from planner.checks.ultrasound import seen
 from planner.issues import Issue
 from planner.probe import tool_axes
@@ -18,6 +17,7 @@ from planner.robot.load import load_robot
 from planner.robot.model import Robot
 from planner.setup import Setup
 from planner.surface.curved import CurvedSurface
+from planner.surface.solid import solid_of
 from planner.toolpath import ToolPath
 
 _ORDER = {"error": 0, "warning": 1, "info": 2}

@@ -9,8 +9,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from planner.checks.solid import Solid
 from planner.frames import Array, Transform
+from planner.surface.solid import Solid
 
 # Below this clearance (mm) spheres no longer decide: the cylinder itself is sampled.
 NEAR_MM = 2.0

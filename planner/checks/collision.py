@@ -7,8 +7,8 @@ from numpy.typing import NDArray
 from scipy.interpolate import CubicSpline
 
 from planner.checks.clearance import Envelope, clearance_mm
-from planner.checks.solid import Solid
 from planner.frames import Array, Transform
+from planner.surface.solid import Solid
 from planner.toolpath import Role, ToolPath
 
 # Steps are halved until the motion between neighbours can no longer hide a contact, or is this short (mm).

@@ -1,10 +1,8 @@
 """Moves between passes that stay clear of the part."""
 
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from typing import Any
-from weakref import WeakKeyDictionary
 
-import igl
 import numpy as np
 
 from planner.frames import Array, Transform
@@ -15,6 +13,7 @@ from planner.path.passes import CLEARANCE_MM
 from planner.setup import Setup
 from planner.surface.curved import CurvedSurface
 from planner.surface.keepouts import keep_outs_of
+from planner.surface.solid import solid_of
 from planner.toolpath import Role, ToolPath
 
 _STEP_MM = 25.0
@@ -22,39 +21,20 @@ _LIFTS = 4
 _ALIKE_DEG = 20.0
 
 
-@dataclass(frozen=True, eq=False)
 class _Body:
-    """The part's triangles with a search tree over them."""
+    """The whole part: how far from it places are, and which way is out."""
 
-    vertices: Array
-    faces: np.ndarray
-    normals: Array
-    tree: igl.AABB
-
-    @classmethod
-    def of(cls, part: Part) -> "_Body":
-        known = _KNOWN.get(part)
-        if known is not None:
-            return known
-        v, f = np.ascontiguousarray(part.vertices), np.ascontiguousarray(part.faces, dtype=np.int64)
-        tree = igl.AABB()
-        tree.init(v, f)
-        body = _KNOWN[part] = cls(v, f, part.face_normals, tree)
-        return body
+    def __init__(self, part: Part) -> None:
+        self._solid, self._normals, self.vertices = solid_of(part), part.face_normals, part.vertices
 
     def height(self, points: Array) -> tuple[Array, Array, Array]:
         """Return the distance (n,), negative behind the nearest triangle, that point (n, 3) and the way out (n, 3)."""
-        squared, face, near = self.tree.squared_distance(self.vertices, self.faces, np.ascontiguousarray(points))
-        distance = np.sqrt(squared)
-        normal = self.normals[face]
+        distance, face, near = self._solid.closest(points)
+        normal = self._normals[face]
         offset = points - near
         outside = np.einsum("ij,ij->i", offset, normal) >= 0.0
         out = np.where((outside & (distance > 1e-6))[:, None], offset / np.maximum(distance, 1e-12)[:, None], normal)
         return np.where(outside, distance, -distance), near, out
-
-
-# Kept as long as the part lives: planners try many paths on one part.
-_KNOWN: WeakKeyDictionary[Part, _Body] = WeakKeyDictionary()
 
 
 def with_links(path: ToolPath, curved: CurvedSurface, setup: Setup) -> ToolPath:
@@ -77,7 +57,7 @@ def with_links(path: ToolPath, curved: CurvedSurface, setup: Setup) -> ToolPath:
     doubtful = np.flatnonzero(~near | detours.crossed(p[0::2], p[1::2], z[0::2], z[1::2]))
     if not len(doubtful):
         return path
-    body = _Body.of(curved.surface.part)
+    body = _Body(curved.surface.part)
     need = 0.9 * (float(path.standoff_mm[path.is_data].min()) + CLEARANCE_MM)
     points, ups, after = [], [], []
     for i in doubtful:

@@ -3,6 +3,7 @@
 from collections.abc import Sequence
 from dataclasses import dataclass
 from enum import IntEnum
+from weakref import WeakKeyDictionary
 
 import igl
 import numpy as np
@@ -62,8 +63,19 @@ class BoundaryCurve:
 def boundary(surface: InspectionSurface) -> tuple[BoundaryCurve, ...]:
     """Return the closed boundary curves of a surface, longest first; none for a closed body.
 
-    Where curves touch in a vertex they are walked as one visits the surface around it, so that none crosses itself.
+    Where curves touch in a vertex they are walked as one visits the surface around it, so that none crosses itself. Kept
+    as long as the surface lives.
     """
+    known = _KNOWN.get(surface)
+    if known is None:
+        known = _KNOWN[surface] = _boundary(surface)
+    return known
+
+
+_KNOWN: "WeakKeyDictionary[InspectionSurface, tuple[BoundaryCurve, ...]]" = WeakKeyDictionary()
+
+
+def _boundary(surface: InspectionSurface) -> tuple[BoundaryCurve, ...]:
     faces = welded_faces(surface.part)[surface.part_faces]
     edges = edges_of(faces)
     face, corner = np.nonzero(edges.is_boundary[edges.of_face])

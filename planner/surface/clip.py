@@ -17,8 +17,9 @@ from planner.shapes import Box, Brush
 from planner.surface.curved import CurvedSurface
 from planner.surface.inspection import InspectionSurface
 from planner.surface.keepouts import PARENTS
+from planner.surface.select import welded_faces
 from planner.surface.subdivide import Subdivision, split_at_zero, split_long_edges
-from planner.surface.topology import Index, edges_of, weld, weld_tolerance_mm
+from planner.surface.topology import edges_of
 
 LEFT_OUT = "left_out_mm2"
 """Key of `Part.meta`: areas (mm2) of pieces that a box or the brush cut off, which are not inspected."""
@@ -190,7 +191,7 @@ def _on_smooth(surface: InspectionSurface, s: Subdivision, old: int, footprint_m
 
 def _one_piece(part: Part, rows: NDArray[np.intp], seeds: Array | None) -> tuple[NDArray[np.intp], list[float]]:
     """Return the rows of the piece that is inspected, ascending, and the areas (mm2) of those that are not."""
-    faces = _welded(part)[rows]
+    faces = welded_faces(part)[rows]
     edges = edges_of(faces)
     pair = edges.uses == 2
     n = len(rows)
@@ -205,7 +206,3 @@ def _one_piece(part: Part, rows: NDArray[np.intp], seeds: Array | None) -> tuple
         holds = {int(piece[np.linalg.norm(centre - p, axis=1).argmin()]) for p in seeds}
         best = max(holds, key=lambda k: float(area[k]))
     return rows[piece == best], [float(a) for k, a in enumerate(area) if k != best]
-
-
-def _welded(part: Part) -> Index:
-    return np.asarray(weld(part.vertices, weld_tolerance_mm(part.vertices))[part.faces], dtype=np.int64)

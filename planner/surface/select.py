@@ -1,6 +1,7 @@
 """Which triangles of a part are inspected: flooded from seeds up to the creases, or the largest smooth face."""
 
 from dataclasses import dataclass, replace
+from weakref import WeakKeyDictionary
 
 import igl
 import numpy as np
@@ -70,9 +71,15 @@ def inspection_surface(
 
 
 def welded_faces(part: Part) -> Index:
-    """Return the faces (f, 3) of a part with vertices that coincide within rounding made one."""
-    same = weld(part.vertices, weld_tolerance_mm(part.vertices))
-    return np.asarray(same[part.faces], dtype=np.int64)
+    """Return the faces (f, 3) of a part with vertices that coincide within rounding made one; kept as long as it lives."""
+    known = _WELDED.get(part)
+    if known is None:
+        same = weld(part.vertices, weld_tolerance_mm(part.vertices))
+        known = _WELDED[part] = np.asarray(same[part.faces], dtype=np.int64)
+    return known
+
+
+_WELDED: "WeakKeyDictionary[Part, Index]" = WeakKeyDictionary()
 
 
 def dihedral_rad(part: Part, edges: Edges) -> Array:

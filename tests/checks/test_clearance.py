@@ -8,9 +8,9 @@ from scipy.spatial.transform import Rotation
 
 from planner.checks.clearance import Envelope, clearance_mm, cylinder_distance_mm
 from planner.checks.collision import path_clearance, spline_bulge_mm
-from planner.checks.solid import Solid, solid_of
 from planner.frames import Transform
 from planner.setup import Setup
+from planner.surface.solid import Solid, solid_of
 from planner.toolpath import Role
 from tests.checks.parts import curved, path_on, sheet, surface_samples, with_block
 
