@@ -2,17 +2,24 @@
 
     python -m benchmarks.alignment.speed [--readings 1600000]
 
-Arrays and a loaded mesh in, a placement out; building of trees included on both sides. Simulated truth. The other
-libraries, if installed (`pip install echobase[bench]`), get the same measured points and the mesh's own points and normals.
+Arrays and a loaded mesh with its normals in, a placement out; building of trees included on both sides. Simulated truth.
+The other libraries get the same measured points and the mesh's own points and normals. They run in an interpreter of their own,
+`--python` or $ECHOBASE_BENCH_PYTHON (else this one), with as many threads as they like.
 """
 
 import argparse
+import json
+import os
+import subprocess
+import sys
 import time
+from pathlib import Path
+from tempfile import TemporaryDirectory
 
 import numpy as np
 
 from alignment.cloud import PointCloud
-from alignment.estimate.map import align_map
+from alignment.estimate.map import MapFit, align_map
 from planner.frames import Array, Transform
 from planner.part import Part, Provenance
 from planner.placement import part_from_correction
@@ -53,42 +60,22 @@ def readings(surface, T_true: Transform, count: int, rng: np.random.Generator) -
     return cloud, origin + d[:, None] * beam
 
 
-def open3d_icp(points: Array, curved: CurvedSurface) -> Transform:
-    """Return Open3D's point-to-plane ICP of measured points onto the mesh's vertices and normals."""
-    import open3d  # noqa: PLC0415
-
-    def pcd(p: Array, n: Array | None = None):
-        cloud = open3d.geometry.PointCloud(open3d.utility.Vector3dVector(p))
-        if n is not None:
-            cloud.normals = open3d.utility.Vector3dVector(n)
-        return cloud
-
-    s = curved.surface
-    centres, normals = s.vertices[s.faces].mean(axis=1), s.face_normals
-    target = pcd(np.vstack([s.vertices, centres]), np.vstack([curved.vertex_fit.normals, normals]))
-    found = open3d.pipelines.registration.registration_icp(
-        pcd(points), target, 6.0, np.eye(4), open3d.pipelines.registration.TransformationEstimationPointToPlane()
-    )
-    return Transform.from_matrix("part", "base", found.transformation).inv()
-
-
-def small_gicp(points: Array, curved: CurvedSurface) -> Transform:
-    """Return small_gicp's point-to-plane registration of the same points, on all cores."""
-    import small_gicp as gicp  # noqa: PLC0415
-
-    s = curved.surface
-    target = gicp.PointCloud(np.vstack([s.vertices, s.vertices[s.faces].mean(axis=1)]))
-    tree = gicp.KdTree(target)
-    gicp.estimate_normals_covariances(target, tree)
-    source = gicp.PointCloud(points)
-    found = gicp.align(target, source, tree, registration_type="PLANE_ICP", max_correspondence_distance=6.0)
-    return Transform.from_matrix("part", "base", found.T_target_source).inv()
+def peer(name: str, folder: Path, python: str) -> tuple[Transform, float, float] | None:
+    """Return another library's placement, its seconds and its seconds of processor; None where it is not installed."""
+    env = {k: v for k, v in os.environ.items() if k not in ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS")}
+    script = Path(__file__).with_name("peers.py")
+    done = subprocess.run([python, str(script), str(folder), name], capture_output=True, text=True, env=env, check=True)
+    found = json.loads(done.stdout.splitlines()[-1])
+    if not found:
+        return None
+    return Transform.from_matrix("part", "base", found["matrix"]).inv(), found["wall_s"], found["cpu_s"]
 
 
 def main() -> None:
     """Run the benchmark and print its table."""
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("--readings", type=int, default=1_600_000)
+    parser.add_argument("--python", default=os.environ.get("ECHOBASE_BENCH_PYTHON", sys.executable))
     asked = parser.parse_args()
     surface, setup = wing(1500.0), Setup()
     vertices, faces = surface.mesh(721, 201)
@@ -98,22 +85,34 @@ def main() -> None:
     cloud, points = readings(surface, T_true, asked.readings, np.random.default_rng(1))
     print(f"{len(cloud)} readings, {len(faces)} triangles")
 
-    def timed(name: str, run) -> None:
-        start = time.perf_counter()
-        try:
-            T = run()
-        except ImportError:
-            print(f"{name:32s} not installed")
-            return
-        seconds = time.perf_counter() - start
+    def say(name: str, T: Transform, wall_s: float, cpu_s: float) -> None:
+        error = normal_error_mm(surface, T_true, T)
         print(
-            f"{name:32s} {seconds:7.2f} s   largest normal error {normal_error_mm(surface, T_true, T):.4f} mm",
-            flush=True,
+            f"{name:28s} {wall_s:7.2f} s {cpu_s:7.2f} s of processor   largest normal error {error:.4f} mm", flush=True
         )
 
-    timed("EchoBase MAP", lambda: align_map(cloud, curved, setup, edges=False).T_base_part)
-    timed("Open3D point-to-plane ICP", lambda: open3d_icp(points, curved))
-    timed("small_gicp point-to-plane", lambda: small_gicp(points, curved))
+    wall, cpu = time.perf_counter(), time.process_time()
+    fit = align_map(cloud, curved, setup, edges=False)
+    wall, cpu = time.perf_counter() - wall, time.process_time() - cpu
+    if not isinstance(fit, MapFit):
+        raise SystemExit("EchoBase found no placement")
+    say("EchoBase MAP", fit.T_base_part, wall, cpu)
+    s = curved.surface
+    centres = s.vertices[s.faces].mean(axis=1)
+    arrays = {
+        "points": points,
+        "target": np.vstack([s.vertices, centres]),
+        "normals": np.vstack([curved.vertex_fit.normals, s.face_normals]),
+    }
+    with TemporaryDirectory() as folder:
+        for part_name, array in arrays.items():
+            np.save(Path(folder) / f"{part_name}.npy", array)
+        for name, title in (("open3d", "Open3D point-to-plane ICP"), ("small_gicp", "small_gicp point-to-plane")):
+            found = peer(name, Path(folder), asked.python)
+            if found is None:
+                print(f"{title:28s} not installed")
+            else:
+                say(title, *found)
 
 
 if __name__ == "__main__":
