@@ -16,7 +16,6 @@ from scipy.stats import norm, qmc
 
 from alignment.estimate.noise_kernel import NAMES, Kernel
 from alignment.estimate.noise_rows import NoiseRows
-from alignment.estimate.side_by_side import side_by_side
 from planner.frames import Array
 
 DRAWS = 128
@@ -94,18 +93,9 @@ def fit_noise(rows: NoiseRows, prior: NoisePrior, draws: int = DRAWS) -> NoiseFi
     side = np.where(unit >= 0.0, stretch[0], stretch[1])
     samples = np.tile(theta, (draws, 1))
     samples[:, active] += PROPOSAL_WIDTH * (unit * side) @ root.T
-    log_weight = np.full(draws, -np.inf)
-    whitened: list[tuple[Array, Array] | None] = [None] * draws
-
-    def look(picked: range) -> None:
-        own = kernel.twin()
-        for i in picked:
-            found = _at(own, rows, prior, samples[i])
-            if found is not None:
-                whitened[i] = (found.xw, whiten_back(found.lower, found.xw))
-                log_weight[i] = found.value
-
-    side_by_side(look, [range(0, draws, 2), range(1, draws, 2)])
+    found = [_at(kernel, rows, prior, sample) for sample in samples]
+    log_weight = np.array([-np.inf if at is None else at.value for at in found])
+    whitened = [None if at is None else (at.xw, at.solved) for at in found]
     log_weight += (0.5 * unit**2 + np.log(side)).sum(axis=1)
     weights = np.exp(log_weight - log_weight.max())
     weights /= weights.sum()
@@ -155,11 +145,15 @@ def whiten_back(lower: Array, b: Array) -> Array:
 
 @dataclass(frozen=True, eq=False)
 class At:
-    """value: logarithm of the posterior at some theta. lower (n, n): factor of its covariance. xw (n, k): L^-1 x."""
+    """value: logarithm of the posterior at some theta. lower (n, n): factor of its covariance, until the next is asked for.
+
+    xw (n, k): L^-1 x. solved (n, k): K^-1 x.
+    """
 
     value: float
     lower: Array
     xw: Array
+    solved: Array
 
 
 def _at(kernel: Kernel, rows: NoiseRows, prior: NoisePrior, theta: Array) -> At | None:
@@ -173,7 +167,7 @@ def _at(kernel: Kernel, rows: NoiseRows, prior: NoisePrior, theta: Array) -> At 
     inner = np.linalg.cholesky(xw.T @ xw + np.eye(rows.x.shape[1]) / WIDE**2)
     explained = np.linalg.solve(inner, xw.T @ rw)
     value = -np.log(np.diag(lower)).sum() - np.log(np.diag(inner)).sum() - 0.5 * (rw @ rw - explained @ explained)
-    return At(float(value + prior.log_density(theta)[active].sum()), lower, xw)
+    return At(float(value + prior.log_density(theta)[active].sum()), lower, xw, whiten_back(lower, xw))
 
 
 def _projector(rows: NoiseRows, lower: Array) -> Array:

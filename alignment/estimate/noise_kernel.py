@@ -84,12 +84,6 @@ class Kernel:
             out += [EDGE_NUGGET, EDGE_PATH]
         return tuple(sorted(out))
 
-    def twin(self) -> "Kernel":
-        """Return the same kernel with room of its own to work in, for another thread."""
-        other = Kernel(self.rows)
-        other.__dict__.update({name: value for name, value in self.__dict__.items() if name != "_room"})
-        return other
-
     @cached_property
     def _room(self) -> tuple[Array, Array, Array]:
         """Three (n, n) to work in: asking the system for memory costs as much as the arithmetic."""

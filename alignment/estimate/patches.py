@@ -10,7 +10,7 @@ from scipy.sparse import csc_array
 from alignment.cloud import PointCloud
 from alignment.estimate.cells import Cells
 from alignment.estimate.robust import mad_sigma, tukey_weights
-from alignment.estimate.side_by_side import sum_of_slices
+from alignment.estimate.slices import sum_of_slices
 from planner.frames import Array, Transform
 from planner.surface.curved import CurvedSurface
 from planner.surface.follow import Follower

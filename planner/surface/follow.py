@@ -20,7 +20,7 @@ class Follower:
 
     A foot is followed only while its point stays within the margin in which the nearest triangle is known to lie among
     those already looked at (`planner.surface.nearest`); elsewhere the whole surface is asked again. loose: feet are
-    followed however far they go; for searches whose end is looked at anew.
+    found from the nearest vertex and followed however far they go; for searches whose end is looked at anew.
     """
 
     def __init__(self, curved: CurvedSurface, loose: bool = False) -> None:
@@ -73,7 +73,7 @@ class Follower:
     def _refreshed(self, query: Array, rows: NDArray) -> Foot:
         """Return the feet of some points from the whole surface, and remember how far they may be followed."""
         curved, asked = self.curved, query[rows]
-        near = curved.triangles.nearest(asked)
+        near = curved.triangles.about(asked) if self.loose else curved.triangles.nearest(asked)
         foot, settled = curved.foot_from(asked, near.face, near.bary)
         assert self._known is not None
         sole = settled & foot.interior

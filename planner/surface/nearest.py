@@ -76,6 +76,14 @@ class Triangles:
         margin[left] = 0.0
         return Nearest(face.astype(np.int32), self._clipped(face, at), np.maximum(margin, 0.0), around)
 
+    def about(self, query: Array) -> Nearest:
+        """Return the nearest of the triangles around the nearest vertex: mostly the nearest, for searches that go on."""
+        if not self.is_fine or len(query) > MANY_QUERIES:
+            return self.nearest(query)
+        around = self._corners.query(query, 1)[1]
+        face, at, _ = self._best_around(query, np.arange(len(query)), around)
+        return Nearest(face.astype(np.int32), self._clipped(face, at), np.zeros(len(query)), around[:, None])
+
     def barycentric(self, face: NDArray, at: Array) -> Array:
         """Return barycentrics (n, 3) of points over the planes of faces; negative outside of the triangle."""
         bary = self.barycentric_step(face, at - self.vertices[self.faces[face, 0]])
