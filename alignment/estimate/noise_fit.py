@@ -127,20 +127,19 @@ def factor(k: Array) -> Array | None:
 
     Above the diagonal the factor holds nothing of use.
     """
-    # By columns, as LAPACK counts, K as it lies in memory is its own transpose.
-    upper, failed = dpotrf(k.T, lower=0, clean=0, overwrite_a=1)
-    return None if failed else np.asarray(upper.T, dtype=np.float64)
+    # K is its own transpose, which lies in memory by columns, as LAPACK wants it.
+    lower, failed = dpotrf(k.T, lower=1, clean=0, overwrite_a=1)
+    return None if failed else np.asarray(lower, dtype=np.float64)
 
 
 def whiten(lower: Array, b: Array) -> Array:
     """Return L^-1 b (n, k), L (n, n) the lower factor."""
-    # BLAS counts by columns: L as it lies in memory is its own transpose there.
-    return np.asarray(dtrsm(1.0, lower.T, b, lower=0, trans_a=1), dtype=np.float64)
+    return np.asarray(dtrsm(1.0, lower, b, lower=1), dtype=np.float64)
 
 
 def whiten_back(lower: Array, b: Array) -> Array:
     """Return L^-T b (n, k)."""
-    return np.asarray(dtrsm(1.0, lower.T, b, lower=0), dtype=np.float64)
+    return np.asarray(dtrsm(1.0, lower, b, lower=1, trans_a=1), dtype=np.float64)
 
 
 @dataclass(frozen=True, eq=False)
@@ -172,8 +171,7 @@ def _at(kernel: Kernel, rows: NoiseRows, prior: NoisePrior, theta: Array) -> At 
 
 def _projector(rows: NoiseRows, lower: Array) -> Array:
     """Return P = K^-1 - K^-1 X (X' K^-1 X + 1/wide^2)^-1 X' K^-1 (n, n); the factor is used up."""
-    upper, _ = dpotri(lower.T, lower=0, overwrite_c=1)
-    half = np.tril(upper.T)
+    half = np.tril(dpotri(lower, lower=1, overwrite_c=1)[0])
     inverse = half + half.T
     inverse[np.diag_indices(len(half))] *= 0.5
     kx = inverse @ rows.x

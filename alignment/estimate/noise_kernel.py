@@ -101,8 +101,9 @@ class Kernel:
         c *= mean[:, None]
         c *= mean
         np.fill_diagonal(c, own)
-        # Columns first: then whole rows are copied. ("clip" only says that no index can be wrong.)
-        return c.take(self.rows.block, axis=1).take(self.rows.block, axis=0, out=out, mode="clip")
+        # Symmetric, so that whole rows can be copied both times. ("clip" only says that no index can be wrong.)
+        half = np.ascontiguousarray(c.take(self.rows.block, axis=0).T)
+        return half.take(self.rows.block, axis=0, out=out, mode="clip")
 
     def field_correlation(self, length_mm: float, out: Array | None = None) -> Array:
         """Return the correlation (n, n) of the form error; edges measure something else."""
