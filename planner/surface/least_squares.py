@@ -6,7 +6,12 @@ from numpy.typing import NDArray
 from planner.frames import Array
 
 # A polynomial that few neighbours leave open takes the smallest coefficients: relative to the trace of its equations.
-RIDGE = np.array([1e-12, 1e-12, 1e-12, 1e-9, 1e-9, 1e-9, 1e-6, 1e-6, 1e-6, 1e-6])
+# Mixed terms count by their share of the symmetric tensor, or the smallest would depend on how the tangents lie: on a
+# cylinder given by its two rims alone a tilt would be made up wherever they do not happen to follow the axis.
+RIDGE = np.array([1e-12, 1e-12, 1e-12, 1e-9, 0.5e-9, 1e-9, 1e-6, 1e-6 / 3.0, 1e-6 / 3.0, 1e-6])
+# A cubic leaves at least this much (rad) at the farthest neighbour; a slope is never surer of being nought than this.
+MODEL_RAD, LEAST_TURN_RAD = 5e-4, 1e-3
+MOST_TURN2 = 0.6
 # One-sided fits look in this many directions.
 DIRECTIONS = 8
 # Neighbours that leave less than this share of the directions around a node open do not fix its normal.
@@ -17,19 +22,53 @@ AGREE_RAD = 0.002
 BETTER = 0.5
 
 
-def solve_segments(phi: Array, h: Array, weight: Array, starts: NDArray[np.int64], through: bool = False) -> Array:
+def solve_segments(
+    phi: Array,
+    h: Array,
+    weight: Array,
+    starts: NDArray[np.int64],
+    through: bool = False,
+    slope_precision: Array | None = None,
+) -> Array:
     """Return weighted least-squares coefficients (n, terms) of h (p,) over features phi (terms, p), in the segments that
     begin at `starts` (n,).
 
     through: the first feature is zero throughout (the polynomial goes through its node), and so is its coefficient.
+    slope_precision (n, 2, 2): how surely both slopes are nought, in units of the weights.
     """
     if through:
-        rest = _solve(phi[1:], h, weight, starts, RIDGE[1 : len(phi)])
+        rest = _solve(phi[1:], h, weight, starts, RIDGE[1 : len(phi)], slope_precision)
         return np.hstack([np.zeros((len(starts), 1)), rest])
-    return _solve(phi, h, weight, starts, RIDGE[: len(phi)])
+    return _solve(phi, h, weight, starts, RIDGE[: len(phi)], None)
 
 
-def _solve(phi: Array, h: Array, weight: Array, starts: NDArray[np.int64], ridge: Array) -> Array:
+def slope_precision(
+    turn: tuple[Array, Array], place: tuple[Array, Array], turn2: Array, starts: NDArray[np.int64]
+) -> Array:
+    """Return how surely the slopes at n nodes over their guessed normals are nought (n, 2, 2), in units of the weights.
+
+    turn: how the guessed normals of the neighbours (p,) turn along both tangents; place: where these are, u and v; turn2:
+    squares of their turns. Where normals do not turn along a direction, as along a cylinder given by its rims, no neighbour
+    says anything of the slope but those at the far end, whose height curvature and slope explain equally well. What
+    of the turns goes with the place (a linear regression) is what may be wrong with the guess.
+    """
+    count = np.diff(np.r_[starts, len(turn2)])
+
+    def mean(a: Array, b: Array) -> Array:
+        return np.asarray(np.add.reduceat(a * b, starts) / count)
+
+    square = np.stack([np.stack([mean(a, b) for b in place], axis=1) for a in place], axis=1)
+    square[:, [0, 1], [0, 1]] += 1e-9 * np.trace(square, axis1=1, axis2=2)[:, None] + 1e-30
+    mixed = np.stack([np.stack([mean(t, x) for x in place], axis=1) for t in turn], axis=1)
+    spread = mixed @ np.linalg.inv(square) @ mixed.transpose(0, 2, 1)
+    spread[:, [0, 1], [0, 1]] += LEAST_TURN_RAD**2
+    # A cubic leaves a fourth-order rest: of an arc, turn^4 / 24 over the turn; the mean square turn is about a third of the
+    # largest. Normals of folded triangles count little.
+    left = MODEL_RAD + (np.add.reduceat(np.minimum(turn2, MOST_TURN2), starts) / count) ** 1.5 / 8.0
+    return np.asarray((left**2)[:, None, None] * np.linalg.inv(spread))
+
+
+def _solve(phi: Array, h: Array, weight: Array, starts: NDArray[np.int64], ridge: Array, slopes: Array | None) -> Array:
     terms = len(phi)
     matrix = np.zeros((len(starts), terms, terms))
     right = np.zeros((len(starts), terms))
@@ -42,6 +81,8 @@ def _solve(phi: Array, h: Array, weight: Array, starts: NDArray[np.int64], ridge
     trace = np.einsum("nii->n", matrix) / terms
     diagonal = np.arange(terms)
     matrix[:, diagonal, diagonal] += ridge * np.maximum(trace, 1e-30)[:, None]
+    if slopes is not None:
+        matrix[:, :2, :2] += slopes
     return np.asarray(np.linalg.solve(matrix, right[..., None])[..., 0])
 
 
@@ -59,6 +100,7 @@ def one_sided(
     adjacent: NDArray[np.bool_],
     sizes: NDArray[np.int64],
     two_sided: Array,
+    slopes: Array | None = None,
 ) -> Array:
     """Return coefficients (n, terms) where the curvature jumps at or near a node: fitted to its smoothest surroundings.
 
@@ -66,7 +108,8 @@ def one_sided(
     through both sides has the wrong normal. Candidates are quadrics through the neighbours in each of eight half-planes
     and through those that agree with the nearest ring (`adjacent` (p,)); the one with the smallest residual per neighbour
     to spare is taken, as in essentially non-oscillatory schemes (Harten, Engquist, Osher, Chakravarthy 1987,
-    doi:10.1016/0021-9991(87)90031-3). Without a clearly better one the fit to all stays.
+    doi:10.1016/0021-9991(87)90031-3). Without a clearly better one the fit to all stays. slopes (n, 2, 2):
+    `slope_precision`.
     """
     starts = np.r_[0, np.cumsum(sizes)[:-1]]
     row = np.repeat(np.arange(len(sizes)), sizes)
@@ -87,7 +130,9 @@ def one_sided(
         xx, xy, yy = (np.add.reduceat(np.where(chosen, p, 0.0), starts) / total for p in products)
         spread = 0.5 * (xx + yy) - np.sqrt(0.25 * (xx - yy) ** 2 + xy**2)
         found = np.zeros_like(best)
-        found[:, :6] = solve_segments(phi[:6], h, np.where(chosen, weight, 0.0), starts)
+        found[:, :6] = solve_segments(
+            phi[:6], h, np.where(chosen, weight, 0.0), starts, through=True, slope_precision=slopes
+        )
         slope = np.where(chosen, residual_slope(phi, h, rho, found[row]), 0.0)
         rms = np.sqrt(np.add.reduceat(slope * slope, starts) / np.maximum(count - 5, 1))
         better = (rms < bound) & (spread > LEAST_SPREAD) & (count >= least)

@@ -13,13 +13,17 @@ from scipy.sparse import csr_array, eye_array
 
 from planner.frames import Array
 from planner.surface.clusters import Clusters
-from planner.surface.least_squares import one_sided, residual_slope, solve_segments
+from planner.surface.least_squares import one_sided, residual_slope, slope_precision, solve_segments
 from planner.surface.normals import tangent_frames
 
 # Neighbours turned by more than about this (rad) count little: a quadric does not describe a fillet end to end.
 TURN = 0.35
 # Beyond this residual (rad) a polynomial does not describe both sides of a node: the curvature jumps there.
 KINK_RAD = 0.004
+# Nearest over farthest neighbour of a node among slivers: there the guessed normal has a say in the slope.
+SLIVER = 0.08
+# Mean square of their places across over along: below this they lie in a strip.
+LONG = 0.1
 CHUNK_PAIRS = 60_000
 
 
@@ -108,7 +112,15 @@ def _fit(clusters: Clusters, rings: csr_array, nodes: NDArray[np.int64], terms: 
             phi[4] += _quadratic(spread, f, s) / k**2
             phi[5] += _quadratic(spread, s, s) / k**2
     h /= k
-    coefficients = solve_segments(phi, h, weight, starts, through=exact)
+    sure = None
+    if exact and terms == 10:
+        turned = clusters.normals[other] - m
+        tu, tv = (np.einsum("ij,ij->i", turned, axis) for axis in (f, s))
+        sure = slope_precision((tu, tv), (phi[1], phi[2]), turn2, starts)
+        # Only slivers leave a direction without near neighbours.
+        sure *= np.minimum(SLIVER / nearest[starts], 1.0)[:, None, None] ** 6
+        sure *= np.minimum(LONG / _roundness(phi[1], phi[2], starts), 1.0)[:, None, None] ** 2
+    coefficients = solve_segments(phi, h, weight, starts, through=exact, slope_precision=sure)
     slope = residual_slope(phi, h, rho, coefficients[row])
     slope_rms = np.sqrt(np.add.reduceat(slope * slope, starts) / np.maximum(sizes - 1, 1))
     if exact:
@@ -117,12 +129,26 @@ def _fit(clusters: Clusters, rings: csr_array, nodes: NDArray[np.int64], terms: 
             pair = np.concatenate([np.arange(starts[j], starts[j] + sizes[j]) for j in jumps])
             adjacent = np.asarray(clusters.graph[nodes[row[pair]], other[pair]]).reshape(-1) > 0
             coefficients[jumps] = one_sided(
-                phi[:, pair], h[pair], weight[pair], rho[pair], adjacent, sizes[jumps], coefficients[jumps]
+                phi[:, pair],
+                h[pair],
+                weight[pair],
+                rho[pair],
+                adjacent,
+                sizes[jumps],
+                coefficients[jumps],
+                None if sure is None else sure[jumps],
             )
     full = np.zeros((len(nodes), 10))
     powers = np.array([0, 1, 1, 2, 2, 2, 3, 3, 3, 3])[:terms]
     full[:, :terms] = coefficients * scale[:, None] ** (1.0 - powers)
     return LocalFit(clusters.mean[nodes], first, second, normal, full, slope_rms)
+
+
+def _roundness(u: Array, v: Array, starts: NDArray[np.int64]) -> Array:
+    """Return the smaller over the larger principal mean square of places u, v (p,) around n nodes (n,)."""
+    uu, uv, vv = (np.add.reduceat(a * b, starts) for a, b in ((u, u), (u, v), (v, v)))
+    middle, half = 0.5 * (uu + vv), np.sqrt(0.25 * (uu - vv) ** 2 + uv**2)
+    return np.asarray(np.maximum((middle - half) / np.maximum(middle + half, 1e-30), 1e-9))
 
 
 def _quadratic(tensor: Array, a: Array, b: Array) -> Array:

@@ -176,3 +176,39 @@ def test_chord_error_is_the_gap_of_the_triangles():
 
 def test_footprint_of_the_papers_probe():
     assert footprint_mm(Probe()) == 4.5
+
+
+@pytest.mark.parametrize("taper", [0.0, 0.12])
+@pytest.mark.parametrize("sections", [24, 64])
+@pytest.mark.parametrize("turned", [False, True])
+@pytest.mark.parametrize("single", [False, True])
+def test_a_tube_or_cone_of_two_rims_alone_has_its_normals_wherever_it_stands(taper, sections, turned, single):
+    """CAD tessellations put no vertices between the rims: 400 mm long triangles, a few degrees round."""
+    angle = np.linspace(0, 2 * np.pi, sections, endpoint=False)
+    length = 400.0
+    rims = [(80.0, 0.0), (80.0 - taper * length, length)]
+    vertices = np.concatenate([np.stack([r * np.cos(angle), r * np.sin(angle), 0 * angle + z], 1) for r, z in rims])
+    i, j = np.arange(sections), np.roll(np.arange(sections), -1)
+    faces = np.concatenate([np.stack([i, j, j + sections], 1), np.stack([i, j + sections, i + sections], 1)])
+    turn = np.eye(3)
+    if turned:
+        turn = np.linalg.qr(np.random.default_rng(4).normal(size=(3, 3)))[0]
+        turn *= np.sign(np.linalg.det(turn))
+    placed = vertices @ turn.T
+    if single:
+        placed = placed.astype(np.float32).astype(np.float64)  # as an STL holds it
+    curved = CurvedSurface(whole(placed, faces), 4.5)
+    points, normals = curved.evaluate(*samples(curved.surface, 5000))
+    at = points @ turn
+    radius = np.hypot(at[:, 0], at[:, 1])
+    truth = np.stack([at[:, 0] / radius, at[:, 1] / radius, np.full(len(at), taper)], axis=1)
+    truth /= np.linalg.norm(truth, axis=1, keepdims=True)
+    # Triangles turn by 360 / sections; inside those of a cone, whose ends bend differently, a tenth to a quarter is left.
+    left = 0.05 if taper == 0.0 else 0.25 * 360.0 / sections
+    sag = 80.0 * (1.0 - np.cos(np.pi / sections))
+    assert np.abs(radius - (80.0 - taper * at[:, 2])).max() < (0.1 if taper == 0.0 else 0.8) * sag + 0.005
+    assert angle_deg(normals @ turn, truth).max() < left
+    ends = np.concatenate([[0.0], np.full(2 * sections, taper)])[1:]
+    rim = np.column_stack([np.tile(np.cos(angle), 2), np.tile(np.sin(angle), 2), ends])
+    rim /= np.linalg.norm(rim, axis=1, keepdims=True)
+    assert angle_deg(curved.vertex_fit.normals @ turn, rim).max() < 0.06 * 360.0 / sections
