@@ -43,9 +43,9 @@ def inspection_surface(
 
     seeds_part (n, 3) or (3,), mm: the region flooded from the triangle nearest each seed, across edges whose dihedral
     angle is below crease_deg. Without seeds: the largest such region (with a box: the one with most area in it); of
-    regions within 1 % of it the one that faces up_part (3,) most (default +Z). A flood runs through tangent fillets,
-    which have no crease, into the side walls: max_turn_deg stops it where the facets have turned by more than that from
-    the seed's (or from up_part).
+    regions within 1 % of it the one that faces up_part (3,) most (default +Z), of these the topmost. A flood runs through
+    tangent fillets, which have no crease, into the side walls: max_turn_deg stops it where the facets have turned by more
+    than that from the seed's (or from up_part).
 
     Triangles that touch within rounding are joined even if the file does not share their vertices; edges of three or
     more faces are treated as creases. An open sheet has two sides of one size: the one that faces up_part is meant, and
@@ -62,7 +62,7 @@ def inspection_surface(
     allowed = _facing(part, up if start is None else part.face_normals[start].mean(axis=0), max_turn_deg)
     regions = smooth_regions(part, edges, crease_deg, allowed)
     if start is None:
-        chosen = [_largest(regions if box is None else _in_box(part, regions, box), up)]
+        chosen = [_largest(part, regions if box is None else _in_box(part, regions, box), up)]
     else:
         chosen = sorted(set(regions.label[start].tolist()))
         _expect_one_piece(part, edges, regions, chosen, seeds)
@@ -137,11 +137,17 @@ def smooth_regions(part: Part, edges: Edges, crease_deg: float, allowed: NDArray
     return Regions(label.astype(np.int64), total, normals)
 
 
-def _largest(regions: Regions, up: Array) -> int:
+def _largest(part: Part, regions: Regions, up: Array) -> int:
     alike = np.flatnonzero(regions.area_mm2 >= (1.0 - SAME_SIZE) * regions.area_mm2.max())
     # Rounded, so that the order of the file decides between equals and not the last bit.
     facing = np.round(regions.normals[alike] @ up, 6)
-    return int(alike[np.argmax(facing)])
+    best = alike[facing == facing.max()]
+    if len(best) == 1:
+        return int(best[0])
+    # Of several bodies that face alike the topmost is in reach of the probe.
+    height = part.vertices[part.faces].mean(axis=1) @ up
+    mean = [float(np.round(height[regions.label == r].mean(), 3)) for r in best]
+    return int(best[int(np.argmax(mean))])
 
 
 def _in_box(part: Part, regions: Regions, box: Box) -> Regions:

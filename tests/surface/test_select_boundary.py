@@ -163,3 +163,12 @@ def test_distance_runs_along_the_surface_not_across_a_gap():
     found = distance_to_boundary(surface)
     assert np.abs(found - true).max() < 0.06 * true.max()
     assert np.abs(found - true)[true < 10].max() < 0.1
+
+
+def test_of_two_plates_one_above_the_other_the_upper_is_meant():
+    lower, upper = trimesh.creation.box(extents=[300, 80, 10]), trimesh.creation.box(extents=[300, 80, 10])
+    upper.apply_translation([0, 0, 50])
+    for pair in ((lower, upper), (upper, lower)):
+        both = trimesh.util.concatenate(pair)
+        surface = inspection_surface(part_of(both.vertices, both.faces))
+        assert surface.centroid_part[2] == pytest.approx(55.0)
