@@ -235,7 +235,7 @@ class Inspection(Strict):
     scan_speed_mm_s: float = Field(100.0, gt=0.0, le=2000.0)
     box: Annotated[Box | None, Field(json_schema_extra=_IN_VIEW)] = None
     """Only what of the inspection surface lies inside this box (part, mm) is inspected."""
-    paint: Annotated[tuple[Brush, ...], Field(max_length=2000, json_schema_extra=_IN_VIEW)] = ()
+    paint: Annotated[tuple[Brush, ...], Field(max_length=500, json_schema_extra=_IN_VIEW)] = ()
     """Only what of the inspection surface is painted is inspected; in order, later dabs over earlier ones."""
     keep_outs: Annotated[tuple[KeepOut, ...], Field(max_length=500, json_schema_extra=_IN_VIEW)] = ()
     """Regions where no data are taken: fasteners, brackets, clamps."""

@@ -8,7 +8,7 @@ from planner.setup import Inspection
 from planner.shapes import Brush, DiscKeepOut, KeepOut
 from planner.strict import Xyz
 
-MOST_DABS = 2000
+MOST_DABS = 500
 MOST_REGIONS = 500
 MOST_GUIDE = 200
 

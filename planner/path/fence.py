@@ -43,8 +43,9 @@ class Fence:
             distance = np.minimum(self.mesh.boundary_distance(points, self.margin_mm * 1.5), self.margin_mm * 1.5)
             ends, runs = distance >= self.margin_mm, distance >= self.floor_mm
         if self._has_regions and self.keep is not None:
-            ends &= self.keep.room_mm(points, LEAD_MM) >= 0.0
-            runs &= self.keep.room_mm(points, give_mm=self.slack_mm) >= 0.0
+            gaps = self.keep.gaps_mm(points)
+            ends &= self.keep.each_room_mm(points, LEAD_MM, gaps_mm=gaps).min(axis=0) >= 0.0
+            runs &= self.keep.each_room_mm(points, give_mm=self.slack_mm, gaps_mm=gaps).min(axis=0) >= 0.0
         return ends, runs
 
     def may_end(self, points: Array) -> NDArray[np.bool_]:

@@ -2,6 +2,7 @@
 
 from dataclasses import dataclass
 from functools import cached_property
+from typing import Any
 from weakref import WeakKeyDictionary
 
 import igl
@@ -25,6 +26,7 @@ PARENTS = "parent_faces"
 _LEAST_DEPTH_MM = 5.0
 # On triangles given by number: nearer than this beside them (mm, and as a share of the height over them) is on them.
 _ON_MM, _OVER = 1e-6, 0.1
+_FAR_MM = 50.0
 
 
 @dataclass(frozen=True, eq=False)
@@ -97,9 +99,11 @@ class KeepOuts:
             return np.full(len(points), np.inf)
         return np.asarray(self.each_room_mm(points, ahead_mm, give_mm).min(axis=0))
 
-    def each_room_mm(self, points: Array, ahead_mm: float = 0.0, give_mm: float = 0.0) -> Array:
-        """Return the same for every region (k, n)."""
-        out = self.gaps_mm(points)
+    def each_room_mm(
+        self, points: Array, ahead_mm: float = 0.0, give_mm: float = 0.0, gaps_mm: Array | None = None
+    ) -> Array:
+        """Return the same for every region (k, n); gaps_mm: those of the points, if they are known already."""
+        out = self.gaps_mm(points) if gaps_mm is None else gaps_mm.copy()
         for i, shape in enumerate(self.shapes):
             need = max(shape.margin_mm - give_mm, 0.0)
             out[i] -= need if shape.may_cross else shape.margin_mm + self.nozzle_mm + ahead_mm
@@ -138,15 +142,34 @@ class KeepOuts:
             d, frame = points - corners.mean(axis=0), np.stack(_frame(up), axis=1)
             side = signed_distance_mm(d @ frame, (corners - corners.mean(axis=0)) @ frame)
             return _prism(side, np.abs(d @ up) - shape.depth_mm)
-        vertices, faces = self.triangles(index)
-        points = np.ascontiguousarray(points)
-        _, face, at = igl.point_mesh_squared_distance(points, vertices, faces)
-        normal = unit(np.cross(*(vertices[faces[face, k]] - vertices[faces[face, 0]] for k in (1, 2))))
-        offset = points - at
-        height = np.einsum("ij,ij->i", offset, normal)
-        beside = np.sqrt(np.maximum(np.einsum("ij,ij->i", offset, offset) - height**2, 0.0))
-        # The smooth surface runs above or below the triangles; over them is on them.
-        return np.where(beside <= _ON_MM + _OVER * np.abs(height), -_ON_MM, beside)
+        vertices, faces, tree = self._tree(index)
+        # From afar the distance of the bounds will do: it is never more.
+        low, high = vertices.min(axis=0), vertices.max(axis=0)
+        out = np.linalg.norm(np.maximum(np.maximum(low - points, points - high), 0.0), axis=1)
+        near = np.flatnonzero(out < 2.0 * (shape.margin_mm + self.nozzle_mm) + _FAR_MM)
+        if len(near):
+            at = np.ascontiguousarray(points[near])
+            _, face, foot = tree.squared_distance(vertices, faces, at)
+            normal = unit(np.cross(*(vertices[faces[face, k]] - vertices[faces[face, 0]] for k in (1, 2))))
+            offset = at - foot
+            height = np.einsum("ij,ij->i", offset, normal)
+            beside = np.sqrt(np.maximum(np.einsum("ij,ij->i", offset, offset) - height**2, 0.0))
+            # The smooth surface runs above or below the triangles; over them is on them.
+            out[near] = np.where(beside <= _ON_MM + _OVER * np.abs(height), -_ON_MM, beside)
+        return out
+
+    def _tree(self, index: int) -> tuple[Array, NDArray[np.int64], Any]:
+        known = self._trees.get(index)
+        if known is None:
+            vertices, faces = self.triangles(index)
+            tree = igl.AABB()
+            tree.init(vertices, faces)
+            known = self._trees[index] = (vertices, faces, tree)
+        return known
+
+    @cached_property
+    def _trees(self) -> dict[int, tuple[Array, NDArray[np.int64], Any]]:
+        return {}
 
     def triangles(self, index: int) -> tuple[Array, NDArray[np.int64]]:
         """Return vertices (v, 3) and faces (f, 3) of a region that was given as triangles."""
@@ -197,12 +220,13 @@ def keep_outs_of(surface: InspectionSurface, setup: Setup) -> KeepOuts:
     key = (setup.inspection.keep_outs, setup.tool.nozzle_radius_mm)
     known = _KNOWN.get(surface)
     if known is None or known[0] != key:
-        up = np.array([_up(surface, s, i) for i, s in enumerate(key[0])]).reshape(-1, 3)
+        nearest = _Nearest(surface)
+        up = np.array([_up(surface, nearest, s, i) for i, s in enumerate(key[0])]).reshape(-1, 3)
         known = _KNOWN[surface] = (key, KeepOuts(surface.part, key[0], up, key[1]))
     return known[1]
 
 
-def _up(surface: InspectionSurface, shape: KeepOut, index: int) -> Array:
+def _up(surface: InspectionSurface, nearest: "_Nearest", shape: KeepOut, index: int) -> Array:
     """Return the outward normal of the surface at a region: of its own triangles, or of the one nearest to its middle."""
     part = surface.part
     if isinstance(shape, FacesKeepOut):
@@ -216,23 +240,37 @@ def _up(surface: InspectionSurface, shape: KeepOut, index: int) -> Array:
             raise fail(
                 "keep-out-flat", "The corners of a keep-out polygon lie on a line.", "Correct it.", _where(index)
             )
-        near = _nearest_normal(surface, corners.mean(axis=0))
+        near = nearest.normal(corners.mean(axis=0))
         return np.asarray(unit(np.where(normal @ near < 0.0, -normal, normal)[None])[0])
     middle = 0.5 * (np.array(shape.min_mm) + shape.max_mm) if isinstance(shape, BoxKeepOut) else shape.centre_mm
-    return _nearest_normal(surface, np.array(middle))
+    return nearest.normal(np.array(middle))
 
 
-def _nearest_normal(surface: InspectionSurface, point: Array) -> Array:
-    """Return the normal of the triangle nearest to a point, without a search tree over all of them."""
-    corners = surface.vertices[surface.faces]
-    centre = corners.mean(axis=1)
-    reach = np.linalg.norm(corners - centre[:, None], axis=2).max(axis=1)
-    away = np.linalg.norm(centre - point, axis=1)
-    near = np.flatnonzero(away - reach <= away.min())
-    closest = trimesh.triangles.closest_point(corners[near], np.tile(point, (len(near), 1)))
-    gap = np.linalg.norm(closest - point, axis=1)
-    alike = near[gap <= gap.min() + 1e-6]
-    return np.asarray(unit((surface.face_areas_mm2[alike] @ surface.face_normals[alike])[None])[0])
+class _Nearest:
+    """Normals of the triangles nearest to a few places, without a search tree over all of them."""
+
+    def __init__(self, surface: InspectionSurface) -> None:
+        self._surface = surface
+
+    @cached_property
+    def _balls(self) -> tuple[Array, Array, Array]:
+        corners = self._surface.vertices[self._surface.faces]
+        centre = corners.mean(axis=1)
+        reach = np.sqrt(np.einsum("fkj,fkj->fk", *(2 * [corners - centre[:, None]])).max(axis=1))
+        return corners, centre, reach
+
+    def normal(self, point: Array) -> Array:
+        """Return the unit outward normal (3,) at the place of the surface nearest to a point (3,)."""
+        corners, centre, reach = self._balls
+        offset = centre - point
+        away = np.sqrt(np.einsum("ij,ij->i", offset, offset))
+        near = np.flatnonzero(away - reach <= away.min())
+        closest = trimesh.triangles.closest_point(corners[near], np.tile(point, (len(near), 1)))
+        gap = np.linalg.norm(closest - point, axis=1)
+        alike = near[gap <= gap.min() + 1e-6]
+        rows = self._surface.part_faces[alike]
+        part = self._surface.part
+        return np.asarray(unit((part.face_areas_mm2[rows] @ part.face_normals[rows])[None])[0])
 
 
 def _rows_of(part: Part, shape: FacesKeepOut, name: str, index: int) -> NDArray[np.intp]:
