@@ -27,6 +27,7 @@ from planner.surface.inspection import InspectionSurface
 from planner.toolpath import PathKind, ToolPath
 
 EDIT_ATTEMPTS = 5
+MOST_SEEDS = 64
 
 
 class StoreModel:
@@ -113,7 +114,7 @@ class StoreModel:
         rows = np.asarray(seeds_part, dtype=np.float64).reshape(-1, 3)
         if more:
             with self._store.db.read() as session:
-                rows = np.vstack([*inputs.seeds_in(session, self._id), rows])
+                rows = np.vstack([*inputs.seeds_in(session, self._id), rows])[-MOST_SEEDS:]
         seeds = [dict(zip(("x_mm", "y_mm", "z_mm"), map(float, row), strict=True)) for row in rows]
         inputs.put(self._store, self._id, "surface", {"seeds": seeds}, None, who)
 

@@ -55,7 +55,8 @@ def raster(curved: CurvedSurface, setup: Setup) -> ToolPath:
     if len(track.level) == 0:
         raise fail(
             "raster-empty",
-            f"No pass fits on the surface with {inspection.edge_margin_mm:g} mm kept from its edges.",
+            f"No pass fits on the surface with {inspection.edge_margin_mm:g} mm kept from its edges"
+            + (" and the keep-out regions left out." if inspection.keep_outs else "."),
             "Give a smaller inspection.edge_margin_mm, or choose a larger surface.",
             "setup.json: inspection.edge_margin_mm",
         )

@@ -11,6 +11,7 @@ from app.store import inputs, projects
 from app.store.content import put_bytes
 from app.store.refusal import Refusal
 from app.store.store import open_store
+from app.view.edits_surface import dabbed, kept_out
 from app.view.model import ProjectModel
 from app.view.registry import ViewRegistry
 from planner.errors import EchoBaseError
@@ -95,3 +96,27 @@ def _die() -> None:
     import os  # noqa: PLC0415
 
     os._exit(7)
+
+
+def test_clicks_edit_the_inspection_settings_whatever_was_saved_in_between(model):
+    with_part(model)
+    at = np.array([5.0, 5.0, 0.0])
+    model.edit_inspection(lambda old: kept_out(old, at, 4.0, may_cross=False), "view")
+    assert [k.name for k in model.setup().inspection.keep_outs] == ["clamp 1"]
+
+    def late(old):
+        # Somebody saves the cell while the click is on its way.
+        if len(seen) == 0:
+            changed = model.setup().model_copy(update={"standoff_mm": 22.0}).model_dump(mode="json")
+            inputs.put(model._store, model.project_id, "setup", changed, None, "rest")
+        seen.append(old)
+        return dabbed(old, at, 10.0, erase=False)
+
+    seen: list = []
+    model.edit_inspection(late, "view")
+    assert len(seen) == 2
+    assert model.setup().standoff_mm == 22.0
+    assert len(model.setup().inspection.paint) == 1
+    model.select_surface(np.array([[1.0, 2.0, 0.0]]), "view")
+    model.select_surface(np.array([[4.0, 2.0, 0.0]]), "view", more=True)
+    assert len(model._input("surface").content["seeds"]) == 2
