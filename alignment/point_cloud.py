@@ -86,7 +86,7 @@ def _active_base(
             raise fail(
                 "no-corrected-base",
                 "the scan is said to be taken in the corrected BASE, but there is no correction yet.",
-                "Align a scan taken in the nominal BASE first, or leave out --base corrected.",
+                "Align a scan taken in the nominal BASE first, or do not say that this one was taken in the corrected BASE.",
                 scan.name,
             )
         chosen = Transform("world", "scan", T_world_corrected.rigid)

@@ -137,7 +137,7 @@ def _figures(
         raise fail(
             "assess-off-part",
             "the centre law never met the inspection surface.",
-            "Check that the scan is of this part, and in which BASE it was taken (--base).",
+            "Check that the scan is of this part, and say in which BASE it was taken.",
         )
     silent = int(np.count_nonzero(lost_on_part & np.isin(cloud.lost_law, centre_laws(setup.probe))))
     std, width = spread(cloud.distance_mm[used])

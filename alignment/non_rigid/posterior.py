@@ -43,7 +43,7 @@ def solve_nodes(nodes: Nodes, theta: Array, axes: Array, with_field: bool = True
         raise fail(
             "non-rigid-singular",
             "the readings give no usable covariance for a deformation field.",
-            "Align with --rigid.",
+            "Run the alignment as rigid.",
             "scan",
         ) from None
     alpha = cho_solve((lower, True), nodes.deviation_mm, check_finite=False)

@@ -5,7 +5,7 @@ from typing import Any
 
 from app.report.document import Document, Figure, Heading, Issues, Line, Lines, Signatures, Table, Text, Verdict
 from app.report.record import Record
-from app.report.shown import number, shown
+from app.report.shown import MINUS, number, shown
 
 # UFGS 05 05 23.13: where a check finds 2 dB less sensitivity, all since the check before is inspected again.
 SENSITIVITY_DB = 2.0
@@ -64,6 +64,8 @@ def _lines(document: Document, group: Lines) -> dict[str, Any]:
             return {"label": item.label, "value": item.value, "blank": False, "unit": ""}
         value = document.record.text(item.field)
         text = f"{value} {item.unit}".strip() if value else ""
+        if item.unit:
+            text = text.replace("-", MINUS)
         return {"label": item.label, "value": text, "blank": not value, "unit": item.unit}
 
     return {"kind": "lines", "title": group.title, "lines": [line(item) for item in group.lines]}

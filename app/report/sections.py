@@ -53,9 +53,12 @@ def correction_of(plan: Plan, content: dict[str, Any]) -> list[Block]:
         sigma = (number(content["dof"][k]["sigma"], 3 if k in "xyz" else 4) for k in AXES)
         rows.append(("sigma (1 s.d.)", *sigma))
     columns = (TEXT, *(Column(title=t) for t in POSE_TITLES))
+    table = Table(name="correction", columns=columns, rows=tuple(rows))
+    if content["correction"] is None:
+        return [Heading(text="BASE"), table]
     return [
         Heading(text="Correction and BASE"),
-        Table(name="correction", columns=columns, rows=tuple(rows)),
+        table,
         Text(
             text="The corrected BASE is the frame in which the real part sits exactly where the program believes it sits. "
             "Sigma is of the correction about the BASE origin, relative to probe, TCP and couplant as calibrated.",

@@ -83,7 +83,7 @@ def _misfit_said(found: Correction, fit: FieldFit, plan: Plan) -> Correction:
                 "sprung-back",
                 f"the part differs smoothly from its CAD, by up to {largest:.2f} mm where it was scanned; the prediction "
                 "after the correction takes it into account.",
-                "Align with --non-rigid to follow its shape.",
+                "Run the alignment as non-rigid to follow its shape.",
                 "scan",
             )
         ]
