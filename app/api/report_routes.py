@@ -2,7 +2,7 @@
 
 from typing import Annotated, Any, Literal
 
-from fastapi import APIRouter, Query, Response
+from fastapi import APIRouter, Path, Query, Response
 from sqlalchemy.orm import Session
 
 from app.api.context import Context, Ctx, Number, ProjectId
@@ -28,6 +28,8 @@ MEDIA = {
     "csv": "text/csv; charset=utf-8",
 }
 ANSWERS: dict[int | str, dict[str, Any]] = {200: {"content": {kind.split(";")[0]: {} for kind in MEDIA.values()}}}
+SVG: dict[int | str, dict[str, Any]] = {200: {"content": {"image/svg+xml": {}}}}
+FigureName = Annotated[str, Path(pattern=r"^[a-z0-9-]{1,40}$", examples=["deviation"])]
 ZIP: dict[int | str, dict[str, Any]] = {200: {"content": {"application/zip": {}}}}
 
 
@@ -55,6 +57,20 @@ def get_report(
     if format == "html":
         headers["Content-Security-Policy"] = CSP_DOCUMENT
     return Response(content, media_type=MEDIA[format], headers=headers)
+
+
+@router.get("/{kind}s/{number}/figures/{name}", responses=documented(404) | SVG, response_class=Response)
+def get_figure(ctx: Ctx, project_id: ProjectId, kind: Kind, number: Number, name: FigureName) -> Response:
+    """Return one drawing of a report as SVG; `report?format=json` names them."""
+    with ctx.store.db.read() as session:
+        projects.get(session, project_id)
+        results.get_result(session, project_id, kind, number)
+        files = files_of(session, project_id, f"{kind}:{number}")
+    path = f"{FOLDER[kind]}/figures/{name}.svg"
+    if path not in files:
+        raise not_found("drawing", name)
+    headers = {"Content-Security-Policy": CSP_DOCUMENT, "Cache-Control": "no-store"}
+    return Response(get_bytes(ctx.store.blobs, files[path].sha256), media_type="image/svg+xml", headers=headers)
 
 
 @router.get("/{kind}s/{number}/files", responses=documented(404) | ZIP, response_class=Response)

@@ -19,6 +19,7 @@ def json_content(document: Document) -> dict[str, Any]:
         "simulated": document.simulated,
         "made": document.made,
         "version": document.version,
+        "figures": list(document.figures()),
         **document.data,
         "acceptance": None if document.acceptance is None else document.acceptance.model_dump(),
         "record": document.record.model_dump(mode="json"),

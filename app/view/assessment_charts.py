@@ -4,7 +4,7 @@ from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.ndimage import binary_closing
+from scipy.ndimage import binary_closing, distance_transform_edt
 
 from alignment.metrics import Assessment
 from app.view.charts import histogram
@@ -75,8 +75,9 @@ def _map(feet: Array, values: Array, axes: tuple[int, int]) -> dict[str, Any]:
         cell *= 1.25
     total = np.bincount(place, values[known], rows * columns)
     mean = np.divide(total, count, out=np.full(rows * columns, np.nan), where=count > 0)
+    mean = _closed(mean.reshape(rows, columns)).ravel()
     rounded = np.round(mean, 3).astype(object)
-    rounded[count == 0] = None
+    rounded[~np.isfinite(mean)] = None
     middle = low + cell / 2
     return {
         "x0": round(float(middle[0]), 3),
@@ -85,6 +86,14 @@ def _map(feet: Array, values: Array, axes: tuple[int, int]) -> dict[str, Any]:
         "z": rounded.reshape(rows, columns).tolist(),
         **names,
     }
+
+
+def _closed(mean: Array) -> Array:
+    """Return the map (rows, columns) with gaps one cell wide taken from the nearest neighbour: where two passes meet."""
+    filled = np.isfinite(mean)
+    gaps = (binary_closing(filled, np.ones((1, 3))) | binary_closing(filled, np.ones((3, 1)))) & ~filled
+    nearest = distance_transform_edt(~filled, return_distances=False, return_indices=True)
+    return np.where(gaps, mean[tuple(nearest)], mean)
 
 
 def _holes(filled: NDArray[np.bool_]) -> float:

@@ -2,7 +2,7 @@
 
 import { h, uid } from "./dom.js";
 
-const UNITS = [["_mm_s", "mm/s"], ["_m_s", "m/s"], ["_db_per_deg2", "dB/deg²"], ["_mm", "mm"], ["_deg", "deg"], ["_us", "µs"], ["_mhz", "MHz"], ["_pct", "%FSH"], ["_db", "dB"], ["temperature_c", "°C"], ["_c", "°C"]];
+const UNITS = [["_mm_s", "mm/s"], ["_m_s", "m/s"], ["_db_per_deg2", "dB/deg²"], ["_mm", "mm"], ["_deg", "deg"], ["_us", "µs"], ["_mhz", "MHz"], ["_hz", "Hz"], ["_ms", "ms"], ["_pct", "%FSH"], ["_db", "dB"], ["temperature_c", "°C"], ["_c", "°C"]];
 
 /** Unit of a field by its name, and the name without it. */
 export function unitOf(key) {
@@ -56,7 +56,7 @@ export function field({ key, path, schema, label }, value, saved, change) {
   const dirty = JSON.stringify(value ?? null) !== JSON.stringify(saved ?? null);
   const bounds = boundsText(schema, unit);
   const input = inputFor(schema, value, id, name, bounds, (v) => change(path, v));
-  return h("div", { class: `field ${dirty ? "dirty" : ""} ${schema.type === "string" ? "text" : ""}` },
+  return h("div", { class: `field ${dirty ? "dirty" : ""} ${schema.type === "string" ? "text" : ""} ${schema.maxLength > LONG ? "wide" : ""}` },
     h("label", { for: id, title: [schema.description, bounds].filter(Boolean).join("  ") }, label ?? title(key)),
     input, h("span", { class: "unit" }, unit));
 }
@@ -70,6 +70,9 @@ function inputFor(schema, value, id, name, bounds, change) {
     const known = value === undefined || value === null || options.some(([o]) => o === value);
     return h("select", { ...common, onchange: (e) => change(e.target.value) }, [...options, ...(known ? [] : [[value, `${value} (unknown)`]])].map(([o, text]) => h("option", { value: o, selected: o === value }, text)));
   }
+  if (schema.format === "date") return h("input", { ...common, type: "date", value: value ?? "", onchange: (e) => change(e.target.value || null) });
+  if (schema.format === "date-time") return h("input", { ...common, type: "datetime-local", value: localTime(value), onchange: (e) => change(withZone(e.target.value)) });
+  if (schema.maxLength > LONG) return h("textarea", { ...common, rows: 3, maxlength: schema.maxLength, value: value ?? "", onchange: (e) => change(e.target.value) });
   if (schema.type === "array") {
     return h("input", { ...common, type: "text", value: (value ?? []).join(" "), placeholder: "none", onchange: (e) => change(e.target.value.split(/[\s,]+/).filter(Boolean)) });
   }
@@ -86,6 +89,22 @@ function inputFor(schema, value, id, name, bounds, change) {
     });
   }
   return h("input", { ...common, type: "text", value: value ?? "", pattern: patternOf(schema.pattern), maxlength: schema.maxLength, onchange: (e) => e.target.reportValidity() && change(e.target.value) });
+}
+
+// A text that may be longer than this gets an area of its own.
+const LONG = 500;
+const two = (n) => String(Math.abs(Math.trunc(n))).padStart(2, "0");
+
+/** A time with its zone as this browser's clock shows it, for its own input; and back, with the zone. */
+function localTime(text) {
+  if (!text) return "";
+  const t = new Date(text);
+  return `${t.getFullYear()}-${two(t.getMonth() + 1)}-${two(t.getDate())}T${two(t.getHours())}:${two(t.getMinutes())}`;
+}
+function withZone(text) {
+  if (!text) return null;
+  const behind = new Date(text).getTimezoneOffset();
+  return `${text}:00${behind > 0 ? "-" : "+"}${two(behind / 60)}:${two(behind % 60)}`;
 }
 
 // Browsers read patterns with the v flag, where a hyphen in a class must be escaped.

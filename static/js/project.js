@@ -15,11 +15,12 @@ const CONCERNS = {
   alignment: ["alignment"],
   assessment: ["assessment"],
   project: ["project"],
+  record: ["record"],
 };
-const PATHS = { project: "", part: "/part", setup: "/setup", surface: "/surface", keypoints: "/keypoints", plan: "/plan", scans: "/scans", alignment: "/alignments", assessment: "/assessments", state: "/state" };
+const PATHS = { project: "", part: "/part", setup: "/setup", surface: "/surface", keypoints: "/keypoints", plan: "/plan", scans: "/scans", alignment: "/alignments", assessment: "/assessments", record: "/record", state: "/state" };
 const OPEN = new Set(["queued", "running"]);
 const NEWEST = new Set(["alignment", "assessment"]);
-const ALL = ["project", "part", "setup", "surface", "keypoints", "plan", "scans", "alignment", "assessment"];
+const ALL = ["project", "part", "setup", "surface", "keypoints", "plan", "scans", "alignment", "assessment", "record"];
 
 export class Project {
   constructor(id, changed) {

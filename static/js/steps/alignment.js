@@ -3,11 +3,13 @@
 import { API, get, post } from "../api.js";
 import { askAcceptance } from "../dialog.js";
 import { button, h } from "../dom.js";
+import { drawing } from "../drawer/figure.js";
 import { histograms } from "../drawer/plots.js";
 import { directions, matches, runs } from "../drawer/tables.js";
 import { AXES, facts, fixed, isAngle, mm, ofAxis, pct, poseKey, whole } from "../format.js";
 import { signed } from "../journey.js";
 import { issueList, tag, toneOf, verdict, working } from "../status.js";
+import { compare } from "./compare.js";
 
 export const watchesView = true;
 export const watchesJobs = true;
@@ -24,6 +26,7 @@ export function content(shell) {
   const [word, text] = WORDS[a.verdict] ?? [a.verdict, ""];
   return [
     a.stale ? verdict("warn", "Out of date", `Changed since: ${a.stale_because.join(", ")}.`) : a.accepted ? verdict("good", "Accepted", `By ${a.accepted.name}: ${a.accepted.reason}`) : verdict(toneOf(a.verdict), word, text),
+    a.verdict !== "fail" && compare(shell, a, (chosen) => { Object.assign(local, chosen); run(shell, local); }),
     a.verdict !== "pass" && issueList(a.issues, 8),
     follow(shell, a, local),
     correction(a, setup, hidden(shell)),
@@ -77,7 +80,7 @@ function paper(a, truth) {
 /** Offer to follow the shape of a part that is not as its CAD. */
 function follow(shell, a, local) {
   if (a.stale || a.options?.non_rigid || !a.issues?.some((i) => SHAPED.has(i.code))) return null;
-  return h("div", { class: "row" }, button("Align again, following its shape", () => { local.method = "map"; local.non_rigid = true; local.open = true; run(shell, local); }, { key: "follow" }));
+  return h("div", { class: "row" }, button("Run as non-rigid, following its shape", () => { local.method = "map"; local.non_rigid = true; local.open = true; run(shell, local); }, { key: "follow" }));
 }
 
 /** What was found of a part that sprang back. */
@@ -110,7 +113,8 @@ function options(shell, local) {
 
 function run(shell, local) {
   return shell.do(async () => {
-    await shell.project.run("/alignments", { method: local.method, non_rigid: local.non_rigid, ...(local.edges ? { edges: local.edges === "true" } : {}) });
+    const { method, non_rigid } = local;
+    await shell.project.run("/alignments", { method, non_rigid: method === "map" && non_rigid, ...(local.edges ? { edges: local.edges === "true" } : {}) });
     local.layer = "after";
     if (shell.step === "alignment") await shell.view.send({ step: "alignment" });
   });
@@ -135,8 +139,11 @@ export async function accept(shell, a) {
 export function drawer(shell) {
   const { alignment: a, alignments: all = [] } = shell.project.data;
   if (!a) return { tabs: [], stamp: "" };
+  const path = (n, name) => `${shell.project.path}/alignments/${n}/figures/${name}`;
   return { stamp: `${a.number} ${a.stale} ${all.length}`, tabs: [
     { key: "histogram", title: "Before and after", draw: async (body, alive) => histograms(body, alive, await get(`${shell.project.path}/charts/deviation`)) },
+    ...(a.prediction?.after ? [{ key: "inspection", title: "Predicted inspection", draw: (body, alive) => drawing(body, alive, path(a.number, "inspection")) }] : []),
+    ...(a.non_rigid?.field_rms_mm != null ? [{ key: "shape", title: "Shape of the part", draw: (body, alive) => drawing(body, alive, path(a.number, "shape")) }] : []),
     { key: "points", title: "Key points", draw: (body) => matches(body, a.keypoints, (id) => shell.view.send({ focus: id })) },
     { key: "directions", title: "Directions", draw: (body) => directions(body, a.directions) },
     ...(all.length > 1 ? [{ key: "runs", title: "All alignments", draw: (body) => runs(body, all, (n) => `${API}${shell.project.path}/alignments/${n}/report`) }] : []),

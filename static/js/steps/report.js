@@ -8,6 +8,7 @@ import { fixed, mm, pct } from "../format.js";
 import { issueList, verdict, working } from "../status.js";
 import { accept } from "./alignment.js";
 import { program } from "./programs.js";
+import { record } from "./record.js";
 import { drop, rehearse } from "./scan.js";
 
 export const watchesJobs = true;
@@ -15,17 +16,46 @@ const link = (path, text, props = {}) => h("a", { class: "btn", style: { textDec
 
 export function content(shell) {
   const { alignment: a, assessment } = shell.project.data;
-  const local = (shell.local.report ??= { base: "", path: "corrected", progress: null });
+  const local = (shell.local.report ??= { base: "", path: "corrected", progress: null, roles: {} });
   if (shell.busy("assessment")) return working(shell, "Assessing", "assessment");
-  if (!a) return [verdict("none", "Nothing to report yet", "Align first."), archive(shell)];
+  if (!a) return [verdict("none", "Nothing to report yet", "Align first."), record(shell, local), archive(shell)];
   return [
     shell.busy("simulate") && working(shell, "Rehearsing", "simulate"),
     program(shell, "corrected", "Corrected inspection", a.program, a.corrected_program ?? a.export ?? null),
-    h("div", { class: "row" }, link(`${shell.project.path}/alignments/${a.number}/report`, "Open the report", { target: "_blank", rel: "noopener" }), link(`${shell.project.path}/alignments/${a.number}/report?download=true`, "Save it", { download: "" }), link(`${shell.project.path}/alignments/${a.number}/files`, "Data (zip)", { download: "" })),
-    h("section", { class: "stack" }, h("h3", {}, "Inspection scan"), assessment ? judged(assessment) : h("p", { class: "soft small" }, "Upload the inspection scan (and the one from before the correction), or rehearse them, to see whether the front-wall echo stayed within 2 dB.")),
+    report(shell, "alignments", a, "Report of the alignment"),
+    record(shell, local),
+    h("section", { class: "stack" }, h("h3", {}, "Inspection scan"), assessment ? judged(assessment) : h("p", { class: "soft small" }, "Upload the inspection scan (and the one from before the correction), or rehearse them, to see whether the front-wall echo stayed within 2 dB."), roles(shell, local)),
+    assessment && report(shell, "assessments", assessment, "Report of the inspection scan"),
     local.progress ? h("progress", { value: local.progress.share, max: 1 }) : drop(shell, local),
     archive(shell),
   ];
+}
+
+/** A result's report in every form it comes in. */
+function report(shell, kind, result, text) {
+  const path = `${shell.project.path}/${kind}/${result.number}`;
+  const form = (name, word) => link(`${path}/report?format=${name}&download=true`, word, { download: "" });
+  return h("section", { class: "stack" }, h("h3", {}, text), h("div", { class: "row" },
+    link(`${path}/report`, kind === "alignments" ? "Open the report" : "Open it", { target: "_blank", rel: "noopener" }), form("pdf", "PDF"), form("html", "HTML"), form("csv", "CSV"), form("json", "JSON"), link(`${path}/files`, "Data (zip)", { download: "" })));
+}
+
+const WORDS = [["", "not used"], ["after", "this inspection"], ["before", "from before"]];
+
+/** Which scan is what: chosen by hand, else the newest of the corrected path against the newest of the nominal one. */
+function roleOf(shell, local) {
+  const list = (shell.project.data.scans ?? []).filter((s) => ["inspection", "corrected"].includes(s.path));
+  const corrected = list.filter((s) => s.path === "corrected").at(-1);
+  const nominal = list.filter((s) => s.path === "inspection").at(-1);
+  const usual = (s) => (s === (corrected ?? nominal) ? "after" : s === nominal ? "before" : "");
+  return list.map((s) => [s, local.roles[s.number] ?? usual(s)]);
+}
+
+/** Choose the scans: an inspection may come in several, its passes split over them. */
+function roles(shell, local) {
+  const list = roleOf(shell, local);
+  if (list.length < 2) return null;
+  return h("table", { class: "roles" }, h("tbody", {}, list.map(([s, role]) => h("tr", {}, h("td", {}, `#${s.number}`), h("td", { class: "l" }, s.files.map((f) => f.name).join(", ")),
+    h("td", {}, h("select", { name: `role-${s.number}`, "aria-label": `What scan ${s.number} is`, onchange: (e) => { local.roles[s.number] = e.target.value; shell.draw(); } }, WORDS.map(([v, text]) => h("option", { value: v, selected: v === role }, text))))))));
 }
 
 const archive = (shell) => h("section", { class: "stack" }, h("h3", {}, "Archive"), link(`${shell.project.path}/archive`, "Save the whole project (zip)", { download: "" }));
@@ -38,15 +68,16 @@ function judged(s) {
 }
 
 export function footer(shell) {
-  const { alignment: a, scans } = shell.project.data;
+  const { alignment: a } = shell.project.data;
   if (a?.verdict === "partial" && !a.accepted && !a.stale) return button("Accept…", () => accept(shell, a), { class: "primary" });
-  const after = (scans ?? []).filter((s) => s.path === "corrected").at(-1);
-  const before = (scans ?? []).filter((s) => s.path === "inspection").at(-1);
+  const chosen = roleOf(shell, shell.local.report ?? { roles: {} });
+  const numbers = (role) => chosen.filter(([, r]) => r === role).map(([s]) => s.number);
+  const after = numbers("after");
   const busy = shell.busy("simulate", "assessment");
-  const assess = () => shell.do(() => shell.project.run("/assessments", { scan: (after ?? before).number, ...(after && before ? { before: before.number } : {}) }));
+  const assess = () => shell.do(() => shell.project.run("/assessments", { scans: after, before: numbers("before") }));
   return [
     h("div", { class: "row tight" }, button("Rehearse uncorrected", () => rehearse(shell, "inspection"), { class: "tiny", disabled: busy }), button("Rehearse corrected", () => rehearse(shell, "corrected"), { class: "tiny", disabled: busy || !a?.program?.available })),
-    after || before ? button(busy ? "Working…" : "Assess the inspection scan", assess, { class: "primary", disabled: busy, key: "assess" })
+    after.length ? button(busy ? "Working…" : "Assess the inspection scan", assess, { class: "primary", disabled: busy, key: "assess" })
       : a?.program?.available && h("a", { class: "btn primary", style: { textAlign: "center", textDecoration: "none", lineHeight: "26px" }, href: href(`${shell.project.path}/programs/corrected`), download: "" }, "Download the corrected program"),
   ];
 }
