@@ -40,10 +40,10 @@ def csv_text(document: Document) -> bytes:
         if isinstance(block, Table):
             for row in block.rows:
                 for column, cell in zip(block.columns[1:], row[1:], strict=True):
-                    out.writerow((block.name, _safe(str(_value(row[0]))), column.title, _text(cell), _unit(cell)))
+                    out.writerow((block.name, _text(row[0]), _safe(column.title), _text(cell), _unit(cell)))
         elif isinstance(block, Lines):
             for line in block.lines:
-                out.writerow(("record", block.title, line.label, _safe(_line(document, line)), line.unit))
+                out.writerow(("record", _safe(block.title), _safe(line.label), _safe(_line(document, line)), line.unit))
     return buffer.getvalue().encode()
 
 

@@ -15,6 +15,8 @@ from types import SimpleNamespace
 
 import numpy as np
 
+from app.report.document import Document, Figure, Line, Lines, Verdict
+from app.report.package import Report
 from planner.errors import fail
 from planner.keypoint import KeyPoint
 from planner.part import Part, Provenance
@@ -133,7 +135,7 @@ def align(folder: Path, scans, options: AlignOptions, progress):
     }
     artifacts = {
         "correction/correction.json": json.dumps(correction).encode(),
-        "correction/report.html": b"<p>report</p>",
+        **report(verdict).files("correction"),
     }
     if verdict != "fail":
         artifacts["corrected/EB_TEST.src"] = PROGRAM
@@ -145,6 +147,16 @@ class AssessOptions:
     before: tuple[Path, ...] = ()
     base: str | None = None
     before_base: str | None = None
+
+
+def report(verdict: str) -> Report:
+    """A small report with a drawing and a line that the record fills."""
+    lines = Lines(
+        title="People", lines=(Line(label="Operator", field="people.operator"), Line(label="S/N", field="part.serial"))
+    )
+    blocks = (Verdict(tone=verdict, word=verdict.upper()), Figure(name="field", caption="", alt=""), lines)
+    drawing = '<svg xmlns="http://www.w3.org/2000/svg" width="9" height="9"/>'
+    return Report(Document(title="Report", subject="panel", version="1", blocks=blocks), {"field": drawing})
 
 
 def assess(folder: Path, scans, options: AssessOptions, progress):
