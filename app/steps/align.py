@@ -70,7 +70,7 @@ class Alignment:
 def run_align(folder: Path, scans: Sequence[Path], options: AlignOptions, progress: Progress) -> Alignment:
     """Return the alignment. A verdict of fail is an answer (no program); raises EchoBaseError for unusable input."""
     progress(0.02, "reading the plan")
-    plan = load_plan(folder)
+    plan, record = load_plan(folder), record_of(folder, options.record)
     progress(0.1, "reading the scan")
     read = read_scans(scans)
     setup = plan.setup
@@ -100,9 +100,7 @@ def run_align(folder: Path, scans: Sequence[Path], options: AlignOptions, progre
     deviation = _deviation(plan, followed)
     if followed.field_npz is not None:
         artifacts["correction/field.npz"] = followed.field_npz
-    data = _report_data(
-        followed, content, deviation, program, [ScanFacts.of(s) for s in read], record_of(folder, options.record)
-    )
+    data = _report_data(followed, content, deviation, program, [ScanFacts.of(s) for s in read], record)
     artifacts |= alignment_report(plan, data).files("correction")
     if program:
         artifacts |= program.files

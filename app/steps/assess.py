@@ -52,7 +52,7 @@ def run_assess(folder: Path, scans: Sequence[Path], options: AssessOptions, prog
     scans: the files of one inspection, passes split over them as they come.
     """
     progress(0.05, "reading the plan")
-    plan = load_plan(folder)
+    plan, record = load_plan(folder), record_of(folder, options.record)
     found = last_correction(folder)
     progress(0.15, "reading and judging the scan")
     after, facts = _judge(plan, found, scans, options.base, "scan")
@@ -70,7 +70,7 @@ def run_assess(folder: Path, scans: Sequence[Path], options: AssessOptions, prog
         if found is None
         else "The part is taken to be where the alignment found it."
     )
-    data = AssessmentData(content, after, earlier, issues, facts, where, record_of(folder, options.record))
+    data = AssessmentData(content, after, earlier, issues, facts, where, record)
     artifacts = {"assessment.json": text.encode()} | assessment_report(plan, data).files("assessment")
     progress(1.0, "assessed")
     return AssessmentResult(content, artifacts, issues, after, earlier)
