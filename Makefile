@@ -3,7 +3,7 @@
 PYTHON ?= python3.11
 BIN := .venv/bin
 
-.PHONY: demo test test-pages serve bench lint format golden samples picture constraints clean
+.PHONY: demo test serve bench lint format golden samples picture constraints clean
 
 .venv/runtime.stamp: pyproject.toml constraints.txt
 	@$(PYTHON) -m venv .venv 2>/dev/null || { \
@@ -27,14 +27,10 @@ demo: .venv/runtime.stamp
 serve: .venv/runtime.stamp
 	@$(BIN)/echobase serve
 
-# The browser tests get a process of their own: software rendering wants the machine to itself. Two of them, with two pages
-# on one server, sometimes wait for ever (docs/decisions.md); `make test-pages` runs all of them.
+# The browser tests get a process of their own: software rendering wants the machine to itself.
 test: .venv/test.stamp lint
-	$(BIN)/python -m pytest tests/browser -k "not two_browsers and not was_killed"
-	$(BIN)/python -m pytest --ignore=tests/browser
-
-test-pages: .venv/test.stamp
 	$(BIN)/python -m pytest tests/browser
+	$(BIN)/python -m pytest --ignore=tests/browser
 
 lint: .venv/test.stamp
 	$(BIN)/ruff check .
