@@ -1,15 +1,14 @@
 """Where the echo falls to half: crossings of the part's edges, along the passes and across the laws.
 
 Half the amplitude (-6 dB) means half of the beam on the part, so its middle stands over the edge. Between two readings
-the place is found on the beam's own S-curve, which the scan itself shows, not on a chord.
+the place is found on the beam's own S-curve (`edge_curve`).
 """
 
-from dataclasses import dataclass, fields, replace
+from dataclasses import dataclass, fields
 
 import numpy as np
 from numpy.typing import NDArray
 from scipy.ndimage import median_filter, uniform_filter
-from scipy.special import ndtri
 
 from alignment.cloud import PointCloud
 from alignment.estimate.pose_line import PoseLine
@@ -21,14 +20,6 @@ from planner.setup import Probe
 MOST_GAP_MM = 6.0
 # Around a reading, how far its plateau is looked for along the pass and across the laws (mm).
 PLATEAU_ALONG_MM, PLATEAU_ACROSS_MM = 12.0, 6.0
-# Shares of the plateau beyond which the S-curve says nothing about the place.
-SHARE_LIMITS = (0.02, 0.98)
-# Beams tried: from Gaussian (0) to a sharp disc (1), half to twice as wide as the set-up says.
-BLENDS = (0.0, 0.25, 0.5, 0.75, 1.0)
-WIDTHS = np.geomspace(0.5, 2.0, 61)
-SIGMAS_PER_WIDTH = 2.3548
-# An error of a share beyond this is a splash, not a shape.
-MOST_ERROR = 0.1
 
 
 @dataclass(frozen=True, eq=False)
@@ -107,8 +98,7 @@ def edge_points(cloud: PointCloud, line: PoseLine, probe: Probe) -> EdgePoints:
         line.s_mm[pose].mean(axis=1),
         law.mean(axis=1),
     )
-    clear = found.take(_clear(found.window))
-    return locate(clear, np.ones(len(clear)), probe.beam_width_mm)
+    return found.take(_clear(found.window))
 
 
 def _clear(window: Array) -> NDArray[np.bool_]:
@@ -176,55 +166,6 @@ def _crosses(a: Array, b: Array) -> NDArray[np.bool_]:
     return (a > 0.5) != (b > 0.5)
 
 
-def locate(points: EdgePoints, cosine: Array, beam_width_mm: float) -> EdgePoints:
-    """Return the crossings with their places found anew; cosine (k,): of the angle between their step and the conormal.
-
-    Each of the two readings places the edge by its own share on the S-curve, the steeper part counting more; with both on
-    the curve, its width all but cancels. Where both are off it, half way is all there is.
-    """
-    gap = np.maximum(points.gap_mm * np.clip(cosine, 0.2, 1.0), 1e-9)
-    curve = _fit_curve(points, gap, beam_width_mm)
-    return replace(points, at=_place(points, gap, curve))
-
-
-def _place(points: EdgePoints, gap: Array, curve: Array) -> Array:
-    """Return where the edge lies between the two readings (k,), 0..1, if this is the beam's S-curve."""
-    low, high = SHARE_LIMITS
-    f, g = (np.clip(v, low, high) for v in (points.share_on, points.share_off))
-    x_on, x_off = curve @ _inverse(f), -(curve @ _inverse(g))
-    weight_on, weight_off = (np.exp(-(ndtri(v) ** 2)) for v in (f, g))
-    on_curve = [
-        (points.share_on < high) & (points.share_on > low),
-        (points.share_off < high) & (points.share_off > low),
-    ]
-    weight_on, weight_off = weight_on * on_curve[0] + 1e-9, weight_off * on_curve[1] + 1e-9
-    single = (weight_on * x_on / gap + weight_off * (1.0 - x_off / gap)) / (weight_on + weight_off)
-    chord = x_on / np.maximum(x_on + x_off, 1e-9)
-    return np.clip(np.where(on_curve[0] & on_curve[1], chord, single), 0.0, 1.0)
-
-
-def _fit_curve(points: EdgePoints, gap: Array, beam_width_mm: float) -> Array:
-    """Return the weights (2,), mm, of a Gaussian's and a disc's inverse S-curves that explain the shares around crossings.
-
-    Of blends and widths about the -6 dB width of the set-up, the one with the least squared error of the shares, all
-    eight readings of a crossing taken: also those fully on and fully off the part tell how far the curve reaches.
-    """
-    seen = np.isfinite(points.window)
-    if seen.sum() < 20:
-        return np.array([beam_width_mm / SIGMAS_PER_WIDTH, 0.0])
-    best, chosen = np.inf, np.zeros(2)
-    for blend in BLENDS:
-        for width in beam_width_mm * WIDTHS:
-            curve = np.array([(1.0 - blend) * width / SIGMAS_PER_WIDTH, 0.5 * blend * width])
-            inside = (_place(points, gap, curve)[:, None] - np.arange(-3, 5)) * gap[:, None]
-            table = curve @ _inverse(_SHARES)
-            error = np.interp(inside, table, _SHARES, left=0.0, right=1.0) - points.window
-            cost = float(np.mean(np.minimum(error[seen] ** 2, MOST_ERROR**2)))
-            if cost < best:
-                best, chosen = cost, curve
-    return chosen
-
-
 def _windows(share: Array, line: PoseLine, pose: NDArray, law: NDArray) -> Array:
     """Return shares (k, 8) along the line of each crossing, the crossing between the fourth and the fifth."""
     step_pose, step_law = pose[:, 1] - pose[:, 0], law[:, 1] - law[:, 0]
@@ -235,18 +176,6 @@ def _windows(share: Array, line: PoseLine, pose: NDArray, law: NDArray) -> Array
     p, k = np.clip(p, 0, share.shape[0] - 1), np.clip(k, 0, share.shape[1] - 1)
     inside &= (line.pass_id[p] == line.pass_id[pose[:, :1]]) & line.present[p]
     return np.where(inside, share[p, k], np.nan)
-
-
-_DISC_X = np.linspace(-1.0, 1.0, 401)
-_DISC_SHARE = 0.5 + (np.arcsin(_DISC_X) + _DISC_X * np.sqrt(1.0 - _DISC_X**2)) / np.pi
-
-
-_SHARES = np.clip(np.linspace(0.0, 1.0, 201), 1e-4, 1.0 - 1e-4)
-
-
-def _inverse(share: Array) -> Array:
-    """Return how far inside the edge a beam with this share on the part is (2, k): in Gaussian sigmas, in disc radii."""
-    return np.stack([ndtri(share), np.interp(share, _DISC_SHARE, _DISC_X)])
 
 
 def _none() -> EdgePoints:

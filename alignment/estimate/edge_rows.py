@@ -7,6 +7,7 @@ from functools import cached_property
 import igl
 import numpy as np
 from numpy.typing import NDArray
+from scipy.spatial import cKDTree
 
 from alignment.estimate.edge_points import EdgePoints
 from alignment.estimate.motion import motion_rows
@@ -16,6 +17,8 @@ from planner.surface.curved import CurvedSurface
 
 # A crossing leaves the part about where the edge does, or it is another edge.
 LEAST_COS = 0.5
+# Where the rim turns by more than this within a beam, half the beam on the part does not mean its middle over the edge.
+MOST_TURN = np.radians(30.0)
 # How far off its edge a crossing may be at first (mm): the capture range, and a little for the turn.
 CAPTURE_MM = 13.0
 
@@ -40,12 +43,23 @@ class EdgeRows:
 class EdgeMap:
     """The edges where the part ends as the probe sees it (free, or falling away): segments in `part`, mm."""
 
-    def __init__(self, curves: Sequence[BoundaryCurve]) -> None:
+    def __init__(self, curves: Sequence[BoundaryCurve], beam_width_mm: float = 0.0) -> None:
+        """beam_width_mm: crossings nearer than this to where the rim turns within a beam say nothing; 0: all do."""
         kind = [c.kind != EdgeKind.CONCAVE for c in curves]
         ends = [(c.points[k], np.roll(c.points, -1, axis=0)[k]) for c, k in zip(curves, kind, strict=True)]
         join = lambda parts: np.concatenate(parts) if parts else np.zeros((0, 3))  # noqa: E731
         self.start, self.end = join([a for a, _ in ends]), join([b for _, b in ends])
         self.conormal = join([c.segment_conormals[k] for c, k in zip(curves, kind, strict=True)])
+        self._beam_width_mm = beam_width_mm
+        corners = join([_corners(c, beam_width_mm) for c in curves]) if beam_width_mm > 0 else np.zeros((0, 3))
+        self._corners = cKDTree(corners) if len(corners) else None
+
+    def near_corner(self, points_part: Array) -> NDArray[np.bool_]:
+        """Return which points (k, 3) on the edges are so near a corner that a beam there sees both its sides."""
+        if self._corners is None:
+            return np.zeros(len(points_part), dtype=bool)
+        distance, _ = self._corners.query(points_part, distance_upper_bound=self._beam_width_mm)
+        return np.asarray(np.isfinite(distance))
 
     def __len__(self) -> int:
         return len(self.start)
@@ -62,6 +76,23 @@ class EdgeMap:
         query = np.ascontiguousarray(points_part)
         _, index, point = igl.point_mesh_squared_distance(query, vertices, segments)
         return np.asarray(index).reshape(-1).astype(np.int64), np.asarray(point).reshape(-1, 3)
+
+
+def _corners(curve: BoundaryCurve, beam_width_mm: float) -> Array:
+    """Return the points (q, 3) of a curve about which, within half a beam either way, it turns by more than `MOST_TURN`."""
+    after = curve.segment_conormals
+    cosine = np.einsum("ij,ij->i", np.roll(after, 1, axis=0), after)
+    turn = np.arccos(np.clip(cosine, -1.0, 1.0))
+    length = np.linalg.norm(np.roll(curve.points, -1, axis=0) - curve.points, axis=1)
+    n, total = len(curve), length.sum()
+    s = np.concatenate([[0.0], np.cumsum(length)[:-1]])
+    # Thrice around, so that windows may pass the first point.
+    around = np.concatenate([s - total, s, s + total])
+    turned = np.concatenate([[0.0], np.cumsum(np.tile(turn, 3))])
+    first = np.searchsorted(around, s - 0.5 * beam_width_mm, side="left")
+    last = np.searchsorted(around, s + 0.5 * beam_width_mm, side="right")
+    within = turned[last] - turned[first]
+    return np.asarray(curve.points[within[:n] > MOST_TURN])
 
 
 def edge_rows(
@@ -84,6 +115,7 @@ def edge_rows(
     aside = np.linalg.norm(off - e[:, None] * conormal, axis=1)
     leaves = np.einsum("ij,ij->i", outward, conormal)
     valid = (leaves > LEAST_COS) & (np.abs(e) < CAPTURE_MM) & (aside < 0.5 * np.abs(e) + 1.0)
+    valid &= ~edges.near_corner(point)
     point_base, b = T_base_part.points(point), T_base_part.directions(conormal)
     lag = np.einsum("ij,ij->i", points.travel_base, b)
     return EdgeRows(-e, motion_rows(point_base, b, centre_mm), lag, leaves, valid, point_base, segment)

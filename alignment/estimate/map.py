@@ -10,7 +10,8 @@ from alignment.cloud import PointCloud
 from alignment.estimate.capture import Captured, capture
 from alignment.estimate.cells import cells_along_passes, cells_in_space
 from alignment.estimate.directions import Direction, directions, held_basis
-from alignment.estimate.edge_points import edge_points, locate
+from alignment.estimate.edge_curve import locate
+from alignment.estimate.edge_points import edge_points
 from alignment.estimate.edge_rows import EdgeMap
 from alignment.estimate.locks import LockStrain, lock_strain
 from alignment.estimate.mixture import Mixture, Posterior, mixture, solve
@@ -133,11 +134,13 @@ def edge_data(cloud: PointCloud, problem: Problem, line: PoseLine | None) -> Edg
     """Return the crossings of a cloud and the CAD edges they may belong to; None where there is nothing to match."""
     if line is None:
         return None
-    edges = EdgeMap(boundary(problem.curved.surface))
-    points = edge_points(cloud, line, problem.setup.probe)
+    probe = problem.setup.probe
+    edges = EdgeMap(boundary(problem.curved.surface), probe.beam_width_mm)
+    points = edge_points(cloud, line, probe)
     if len(edges) == 0 or len(points) == 0:
         return None
-    return EdgeData(points, edges, np.zeros(len(points), dtype=bool), BIAS_SHARE * problem.setup.probe.beam_width_mm)
+    points = locate(points, np.ones(len(points)), probe.beam_width_mm)
+    return EdgeData(points, edges, np.zeros(len(points), dtype=bool), BIAS_SHARE * probe.beam_width_mm)
 
 
 def condense_cloud(

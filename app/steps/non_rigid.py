@@ -22,7 +22,7 @@ from planner.placement import assume_nominal, correction, part_from_correction
 from planner.surface.curved import CurvedSurface
 from planner.toolpath import ToolPath
 
-PARTIAL = ("not-rigid", "harmful", "non-rigid-support")
+PARTIAL = ("not-rigid", "harmful", "lock-contradicted", "non-rigid-support")
 # What a rigid verdict says of the misfit; said again of what is left after the field.
 ABOUT_MISFIT = ("not-rigid", "residual-large", "limit-displacement", "limit-rotation", "scan-of-another-part")
 # Suspicions that a better explanation dispels: laws in the wrong order make steps at every pass, no smooth shape.

@@ -151,18 +151,22 @@ def scan(
     tilt_b = np.degrees(np.arctan2((n * xa).sum(1), -(n * za).sum(1)))
     tilt_c = np.degrees(np.arctan2((n * ya).sum(1), -(n * za).sum(1)))
     loss = np.minimum(2.0 * tilt_b**2 + 1.0 * tilt_c**2, 40.0)
-    # Share of a disc-shaped beam that falls on the part: 61 points of the disc, projected along the normal.
-    k = np.arange(61)
-    radius, angle = np.sqrt((k + 0.5) / 61) * probe["beam_width_mm"] / 2, k * 2.399963
+    # Share of a disc-shaped beam that falls on the part: points of the disc, projected along the normal. Each beam's are
+    # turned by an angle of its own, and half of them mirror the others: no crossing is moved by where the points lie.
+    half = 60
+    k = np.arange(half)
+    radius, angle = np.sqrt((k + 0.5) / half) * probe["beam_width_mm"] / 2, k * 2.399963
+    radius, angle = np.r_[radius, radius], np.r_[angle, angle + np.pi]
+    turn = rng.uniform(0.0, 2.0 * np.pi, len(origin))[:, None]
     share = np.zeros(len(origin))
     du, dv = surface.derivatives(u, v)
     guu, guv, gvv = (du * du).sum(1), (du * dv).sum(1), (dv * dv).sum(1)
     det = guu * gvv - guv**2
     for r, a in zip(radius, angle, strict=True):
-        offset = r * np.cos(a) * xa + r * np.sin(a) * ya
+        offset = r * np.cos(a + turn) * xa + r * np.sin(a + turn) * ya
         e, f = (offset * du).sum(1), (offset * dv).sum(1)
         share += surface.inside(u + (gvv * e - guv * f) / det, v + (guu * f - guv * e) / det)
-    share /= 61
+    share /= len(radius)
     amplitude = 50.0 * 10 ** (-loss / 20) * share * (1 + 0.02 * rng.standard_normal(len(d)))
     tof = 2 * (d + tof_mm * rng.standard_normal(len(d))) / (c_m_s * 1e-3)
     lost = amplitude < 2.0
