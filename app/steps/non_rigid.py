@@ -93,6 +93,9 @@ def _misfit_said(found: Correction, fit: FieldFit, plan: Plan) -> Correction:
 
 def _rigid(plan: Plan, found: Correction, surface: CurvedSurface, T: Transform, field: Field | None) -> Followed:
     before, after = _seen(plan, surface, plan.inspection, T, field)
+    # Of a part true to CAD the estimate's own error is all that is left, and `align` foresaw that; a field outweighs it.
+    if field is None and found.after is not None:
+        after = replace(after, summary=found.after)
     found = replace(found, before=before.summary, after=after.summary)
     npz = None if field is None else field_npz(field, plan.curved)
     sent = decimate(plan.inspection)

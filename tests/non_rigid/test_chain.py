@@ -97,6 +97,8 @@ def test_a_true_part_gets_the_rigid_program_whatever_was_asked_for(folder):
     taken = scan(folder, "alignment", truth, true_shape(plan.surface, truth), "true.csv", 7)
     done = {w: run_align(folder, [taken], AlignOptions(non_rigid=w), quiet) for w in (False, True)}
     assert done[True].correction["non_rigid"]["applied"] is False
+    # What is left is the estimate's own error: small, and not nothing.
+    assert 1e-4 < done[False].correction["prediction"]["after"]["tof_std_mm"] < 0.02
     assert done[True].correction["non_rigid"]["reason"]
     assert done[False].correction["non_rigid"] is None
     assert done[True].correction["correction"] == done[False].correction["correction"]
