@@ -45,18 +45,19 @@ def align(
     inspection: ToolPath | None = None,
     method: Method = "map",
     edges: bool | None = None,
+    stay_on_edges: bool = False,
 ) -> Correction:
     """Return where the part is, how well that is known, and whether a robot may trust it.
 
     inspection: the path the verdict is about; without it held directions are not judged. edges: use the edges that the
-    scan crosses; None: where it crosses any. A scan that says too little is an answer (verdict "fail" with its issues), not
-    an exception.
+    scan crosses; None: where it crosses any. stay_on_edges: as in `align_map`. A scan that says too little is an answer
+    (verdict "fail" with its issues), not an exception.
     """
     problem = Problem(curved, setup)
     baseline = align_keypoints(cloud, curved, keypoints, setup) if keypoints else None
     if method == "keypoints":
         return _by_keypoints(cloud, problem, baseline, inspection)
-    found = align_map(cloud, curved, setup, edges is not False)
+    found = align_map(cloud, curved, setup, edges is not False, stay_on_edges)
     if isinstance(found, Captured):
         return _nothing(cloud, problem, baseline, found, method)
     issues = [*cloud.issues, *diagnose_fit(cloud, problem, found)]

@@ -30,6 +30,8 @@ SPEED_SHARE = 0.004
 # Standoffs that differ by less than this, beyond what a misplaced part makes of one, tell nothing about it (mm rms).
 LEAST_STANDOFF_SPREAD_MM = 1.0
 CHORD_MM, CHORD_DEG = 0.01, 0.1
+# No robot and no beam leaves crossings this far (rms, mm) off the edges of a part that is as its CAD.
+OFF_EDGES_MM = 0.5
 
 
 def diagnose_lost(cloud: PointCloud, problem: Problem, captured: Captured) -> list[Issue]:
@@ -80,7 +82,19 @@ def diagnose_fit(cloud: PointCloud, problem: Problem, found: MapFit) -> list[Iss
                 "scan",
             )
         )
-    return issues + speed_issues(found, problem)
+    return issues + edge_issues(found) + speed_issues(found, problem)
+
+
+def edge_issues(found: MapFit) -> list[Issue]:
+    """Return a warning where the placement that fits the surface best does not fit the edges that were crossed."""
+    off_mm = 0.0 if found.edges is None else found.edges["rms_mm"]
+    if off_mm <= OFF_EDGES_MM:
+        return []
+    text = (
+        f"at this placement the crossings lie {off_mm:.2f} mm rms off the part's edges: its shape differs from CAD, and what "
+        "fits the surface best has slid along it by about as much, beyond what sigma says."
+    )
+    return [Issue("warning", "off-edges", text, "Run the alignment as non-rigid: it stays on the edges.", "scan")]
 
 
 def _beyond_limits(found: MapFit, problem: Problem) -> bool:

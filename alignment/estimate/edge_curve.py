@@ -15,7 +15,8 @@ from scipy.special import ndtri
 from alignment.estimate.edge_points import EdgePoints
 from planner.frames import Array
 
-SIGMAS_PER_WIDTH = 2.3548
+# Full width at half maximum of a Gaussian, in standard deviations.
+SIGMAS_PER_WIDTH = float(np.sqrt(8.0 * np.log(2.0)))
 # Beams tried: from Gaussian (0) to a sharp disc (1), half to twice as wide as the set-up says; then finer.
 BLENDS = np.linspace(0.0, 1.0, 5)
 WIDTHS = np.geomspace(0.5, 2.0, 11)
@@ -65,17 +66,20 @@ def _cost(window: Array, gap: Array, blend: float, width: float) -> float:
 
 
 def place(window: Array, gap_mm: Array, blend: float, width_mm: float) -> tuple[Array, Array]:
-    """Return where the edge lies between the two middle readings (k,), 0..1, and the mean squared error of the shares (k,)."""
+    """Return where the edge lies between the two middle readings (k,), 0..1, and the mean squared error of the shares (k,).
+
+    window (k, 8), gap_mm (k,) as in `fit_beam`; of a beam of this blend and -6 dB width, mm. Gauss-Newton, a splash weighing
+    less the farther it is off the curve (Tukey's biweight).
+    """
     depth, slope = _curve(blend)
     share = np.nan_to_num(window)
     known = np.isfinite(window)
     silent = known & (share <= 0.0)
     floor = _least_heard(window)
     scale = gap_mm / width_mm
-    at = np.full(len(window), 0.5)
     # The chord between the two readings is near enough to begin with.
     drop = share[:, 3] - share[:, 4]
-    at = np.clip(np.divide(share[:, 3] - 0.5, drop, out=at, where=drop > 1e-6), 0.0, 1.0)
+    at = np.clip((share[:, 3] - 0.5) / np.maximum(drop, 1e-6), 0.0, 1.0)
     for step in range(STEPS + 1):
         inside = (at[:, None] - _REACH) * scale[:, None]
         expected = np.interp(inside, depth, _SHARES, left=0.0, right=1.0)

@@ -74,8 +74,14 @@ class State:
     nuisance: Array
 
 
-def align_map(cloud: PointCloud, curved: CurvedSurface, setup: Setup, edges: bool = True) -> MapFit | Captured:
-    """Return the estimate, or what the capture came to where nothing can be estimated."""
+def align_map(
+    cloud: PointCloud, curved: CurvedSurface, setup: Setup, edges: bool = True, stay_on_edges: bool = False
+) -> MapFit | Captured:
+    """Return the estimate, or what the capture came to where nothing can be estimated.
+
+    stay_on_edges: of a part that sprang back, say where its edges put it, because its shape will be followed; else where
+    least of the shape is left, even if that is a slide off the edges.
+    """
     problem = Problem(curved, setup)
     captured = capture(cloud, problem)
     if not captured.converged:
@@ -83,15 +89,17 @@ def align_map(cloud: PointCloud, curved: CurvedSurface, setup: Setup, edges: boo
     line = None if cloud.beams_base is None else pose_line(cloud, setup.probe)
     patches = condense_cloud(cloud, problem, captured.T_base_part, line)
     crossed = edge_data(cloud, problem, line) if edges else None
-    found = _fitted(problem, captured, patches, crossed)
+    found = _fitted(problem, captured, patches, crossed, stay_on_edges)
     if isinstance(found, MapFit) and not same_afresh(patches, curved, found.T_base_part, found.rows):
         # Feet that were followed over a fold: now every patch asks the whole surface at every step.
         strict = replace(patches, follower=Follower(curved))
-        found = _fitted(problem, captured, strict, crossed)
+        found = _fitted(problem, captured, strict, crossed, stay_on_edges)
     return found
 
 
-def _fitted(problem: Problem, captured: Captured, patches: Patches, crossed: EdgeData | None) -> MapFit | Captured:
+def _fitted(
+    problem: Problem, captured: Captured, patches: Patches, crossed: EdgeData | None, stay_on_edges: bool
+) -> MapFit | Captured:
     setup, curved = problem.setup, problem.curved
     robust = robust_fit(patches, problem, captured.T_base_part, crossed)
     if robust.edges is not None:
@@ -117,7 +125,7 @@ def _fitted(problem: Problem, captured: Captured, patches: Patches, crossed: Edg
         strain = lock_strain(problem, T, free.covariance[:6, :6]) if i == 0 else strain
         held = held_basis(free.covariance[:6, :6], problem.lock_rows(T))
         state, converged = _settle(state, system, mix, held)
-    state = _plain_if_sprung(state, system, robust.T_base_part, held)
+    state = _plain_if_sprung(state, system, robust.T_base_part, held, stay_on_edges)
     T = state.T_base_part
     post = _solve(state, system, mix, held)
     scale = problem.prior_sigma
@@ -178,17 +186,19 @@ def _settle(state: State, system: System, mix: Mixture, held: Array) -> tuple[St
     return state, moves < 100.0 * SOLVED_MM
 
 
-def _plain_if_sprung(state: State, system: System, T_plain: Transform, held: Array) -> State:
+def _plain_if_sprung(state: State, system: System, T_plain: Transform, held: Array, stay_on_edges: bool) -> State:
     """Return the plain robust fit instead, where the careful one took the shape of a part that sprang back for noise.
 
-    What is left is then no noise of a robot, and the best rigid placement is the one that leaves least of it.
+    What is left is then no noise of a robot, and the best rigid placement is the one that leaves least of it; or, to stay
+    on the edges, the one that does not explain the shape by a motion along the surface that never was.
     """
     plain = system.problem.step(T_plain, -(held @ (held.T @ system.problem.total(T_plain))))
     left = _rms_mm(system, state.T_base_part)
-    if left <= MUCH_WORSE * SHAPE_MM:
+    if left <= MUCH_WORSE * SHAPE_MM and not stay_on_edges:
         return state
     least = _rms_mm(system, plain)
-    if least > SHAPE_MM and left > MUCH_WORSE * least:
+    slid = stay_on_edges and _edge_rms_mm(system, state.T_base_part) > MUCH_WORSE * _edge_rms_mm(system, plain)
+    if least > SHAPE_MM and (left > MUCH_WORSE * least or slid):
         return replace(state, T_base_part=plain)
     return state
 
@@ -199,16 +209,23 @@ def _rms_mm(system: System, T_base_part: Transform) -> float:
     return float(np.sqrt(np.average(rows.r[used] ** 2, weights=system.patches.count[used]))) if used.any() else np.inf
 
 
+def _edge_rms_mm(system: System, T_base_part: Transform) -> float:
+    """Return how far the crossings lie off their edges (rms, mm), 0 without any."""
+    if system.edges is None or not system.edges.used.any():
+        return 0.0
+    found = system.edges.rows(system.problem, T_base_part)
+    return float(np.sqrt(np.mean(found.r[system.edges.used] ** 2)))
+
+
 def _edge_report(state: State, system: System, post: Posterior) -> dict[str, Any] | None:
     if system.edges is None:
         return None
-    found = system.edges.rows(system.problem, state.T_base_part)
     used = system.edges.used
     sigma = np.sqrt(np.diag(post.covariance)[6:])
     return {
         "crossings": len(used),
         "used": int(used.sum()),
-        "rms_mm": float(np.sqrt(np.mean(found.r[used] ** 2))),
+        "rms_mm": _edge_rms_mm(system, state.T_base_part),
         "bias_mm": float(state.nuisance[0] * system.edges.bias_sigma_mm),
         "bias_sigma_mm": float(sigma[0] * system.edges.bias_sigma_mm),
         "lag_mm": float(state.nuisance[1] * LAG_SIGMA_MM),

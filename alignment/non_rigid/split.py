@@ -7,8 +7,9 @@ from alignment.non_rigid.field import Field
 from alignment.non_rigid.samples import Surroundings
 from planner.frames import Array, Transform
 
-# A slide along the surface must gain this share of its size along the normal, or the part is left where its edges say it is.
-SLIDE_COST = 0.1
+# A slide along the surface must gain this share of its size along the normal: any shape has some slide that explains a
+# little of it, and the part would leave the place that its edges give it.
+SLIDE_COST = 1.0
 
 
 def rigid_part(found: Field, around: Surroundings, T_base_part: Transform, directions: tuple[Direction, ...]) -> Array:

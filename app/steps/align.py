@@ -77,7 +77,9 @@ def run_align(folder: Path, scans: Sequence[Path], options: AlignOptions, progre
     last = options.last_correction
     cloud = cloud_of(read, setup, options.base, None if last is None else corrected_base(setup.T_world_base, last))
     progress(0.3, "aligning")
-    rigid = align(cloud, plan.curved, plan.keypoints, setup, plan.inspection, options.method, options.edges)
+    rigid = align(
+        cloud, plan.curved, plan.keypoints, setup, plan.inspection, options.method, options.edges, options.non_rigid
+    )
     progress(0.6, "looking for a deformation")
     followed = follow(plan, cloud, rigid, options.non_rigid)
     found = followed.found
