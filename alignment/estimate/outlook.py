@@ -51,9 +51,10 @@ def after_correction(
         sine = np.linalg.norm(np.cross(turned, beams), axis=1)
         tilt = np.degrees(np.arctan2(sine, -np.einsum("ij,ij->i", turned, beams)))
         std2.append(std**2)
-        rest.append([width, tilt.max(), (loss_db(b_deg, c_deg, setup.probe) >= -WITHIN_DB).mean()])
-    width, tilt_max, within = np.mean(rest, axis=0)
-    return Prediction(float(np.sqrt(np.mean(std2))), float(width), float(tilt_max), float(within))
+        db = loss_db(b_deg, c_deg, setup.probe)
+        rest.append([width, tilt.max(), (db >= -WITHIN_DB).mean(), np.abs(db).mean()])
+    width, tilt_max, within, mean_abs_db = (float(v) for v in np.mean(rest, axis=0))
+    return Prediction(float(np.sqrt(np.mean(std2))), width, tilt_max, within, mean_abs_db)
 
 
 def _draws(covariance: Array, T_base_part: Transform) -> list[tuple[Array, Array]]:

@@ -72,5 +72,6 @@ def expected(curved: Closest, path: ToolPath | Transform, setup: Setup, T_base_p
         tof_range_mm=width,
         tilt_max_deg=float(tilt[on_part].max()) if on_part.any() else float("nan"),
         within_2db=float((db[on_part] >= -WITHIN_DB).mean()) if on_part.any() else float("nan"),
+        mean_abs_db=float(np.abs(db[on_part]).mean()) if on_part.any() else float("nan"),
     )
     return Expected(at_origin.distance_mm, standoff, b_deg, c_deg, tilt, db, on_part, summary)

@@ -45,6 +45,7 @@ class Prediction:
     tof_range_mm: float
     tilt_max_deg: float
     within_2db: float
+    mean_abs_db: float
 
     def to_json(self) -> dict[str, float]:
         """Return the fields of `prediction.before` and `prediction.after`."""

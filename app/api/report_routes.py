@@ -13,6 +13,7 @@ from app.report.package import Report, stored
 from app.security import CSP_DOCUMENT
 from app.store import projects, results
 from app.store.content import get_bytes
+from app.store.freshness import changed_since, in_words
 from app.store.inputs import files_of, record_in
 from app.store.refusal import not_found
 from app.store.tables import FileRow, ResultRow
@@ -101,7 +102,18 @@ def _report(ctx: Context, session: Session, row: ResultRow, files: dict[str, Fil
     }
     accepted = Acceptance.model_validate(row.accepted) if row.accepted else None
     made = stored(get_bytes(ctx.store.blobs, document.sha256), drawn)
-    return made.completed(record_in(session, row.project_id), accepted, row.created)
+    return made.completed(record_in(session, row.project_id), accepted, row.created, _outdated(session, row))
+
+
+def _outdated(session: Session, row: ResultRow) -> str:
+    """Return as a sentence why a result is not the one that counts; empty if it is."""
+    changed = changed_since(session, row)
+    if changed:
+        return f"Changed since it was made: {in_words(changed)}."
+    newest = results.latest(session, row.project_id, row.kind)
+    if newest is not None and newest.number != row.number and newest.sha256 != row.sha256:
+        return f"The {row.kind} in force is number {newest.number}; this is number {row.number}."
+    return ""
 
 
 def _as_made(ctx: Context, files: dict[str, FileRow], kind: str, form: str) -> bytes:

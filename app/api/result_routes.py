@@ -90,7 +90,7 @@ def accept_alignment(ctx: Ctx, project_id: ProjectId, number: Number, body: Acce
 def use_alignment(ctx: Ctx, project_id: ProjectId, number: Number) -> AlignmentInfo:
     """Put an earlier alignment in force again: it becomes the newest, with the same files, proof and acceptance.
 
-    A failed or stale one cannot be. The newest one stays as it is.
+    A failed or stale earlier one cannot be. The newest one stays as it is.
     """
     with ctx.store.db.write() as session:
         projects.get(session, project_id)

@@ -15,6 +15,7 @@ from app.store import inputs, projects, scans
 from app.store.blobs import Blob
 from app.store.content import chunks
 from app.store.refusal import not_found, refuse
+from app.store.results import correction_in_force
 from app.store.store import Store
 from app.store.tables import ScanRow
 
@@ -131,7 +132,9 @@ def _add(store: Store, project_id: str, received: Received, base: str | None, pa
         # Two files of one name stay two files, in the order they came.
         files[name if name not in files else f"2-{name}"] = blob
     with store.db.write() as session:
-        return scans.add(session, project_id, files, "uploaded", base, path, {})
+        # A scan remembers the BASE it was taken in: which correction that was, before another one is in force.
+        detail = {"correction": correction_in_force(session, project_id)} if base == "corrected" else {}
+        return scans.add(session, project_id, files, "uploaded", base, path, detail)
 
 
 def _answer(store: Store, row: ScanRow) -> Scan:

@@ -7,7 +7,7 @@ from sqlalchemy.orm import Session
 from app.store import inputs, scans
 from app.store.freshness import changed_since, in_words, plan_inputs
 from app.store.refusal import refuse
-from app.store.results import latest
+from app.store.results import CORRECTION, correction_in_force, latest
 from app.store.store import VERSION
 from app.store.tables import ResultRow, ScanRow
 
@@ -56,7 +56,7 @@ def align_spec(session: Session, pid: str, numbers: list[int] | None, options: d
     spec_options = {**options, "base": base, "scan_files": scan_files, "scans": [s.number for s in chosen]}
     made_from: dict[str, Any] = {"plan": plan.sha256, "scans": [s.sha256 for s in chosen], "version": VERSION}
     if base == "corrected":
-        files |= _correction(session, pid, plan)
+        files |= _correction(session, pid, chosen)
     return {"files": _plan_files(session, plan) | files, "options": spec_options, "inputs": made_from}
 
 
@@ -81,7 +81,8 @@ def assess_spec(
         "standoff_mm": setup.standoff_mm, "loss_db": setup.tolerances.loss_db,
     }  # fmt: skip
     made_from = {"plan": plan.sha256, "scans": [s.sha256 for s in (*after, *earlier)], "version": VERSION}
-    more |= _correction(session, pid, plan)
+    made_from["correction"] = correction_in_force(session, pid)
+    more |= _correction(session, pid, [*after, *earlier])
     return {"files": _plan_files(session, plan) | files | more, "options": options, "inputs": made_from}
 
 
@@ -105,13 +106,19 @@ def _plan_files(session: Session, plan: ResultRow) -> dict[str, str]:
     return {name: f.sha256 for name, f in inputs.files_of(session, plan.project_id, f"plan:{plan.number}").items()}
 
 
-def _correction(session: Session, pid: str, plan: ResultRow) -> dict[str, str]:
-    """Return correction.json of the newest alignment of the plan: the BASE that a corrected program ran in."""
-    alignment = latest(session, pid, "alignment")
-    if alignment is None or alignment.inputs["plan"] != plan.sha256 or alignment.verdict == "fail":
-        return {}
-    name = "correction/correction.json"
-    return {name: inputs.files_of(session, pid, f"alignment:{alignment.number}")[name].sha256}
+def _correction(session: Session, pid: str, taken: list[ScanRow]) -> dict[str, str]:
+    """Return the correction.json that gives the BASE of scans: the one in force when they came, not one made since.
+
+    Scans that do not know it (they came before any, or from an older server) stand in the one in force now.
+    """
+    known = {scan.detail.get("correction") for scan in taken if scan.base == "corrected"} - {None, ""}
+    if len(known) > 1:
+        raise refuse(
+            409, "bases-differ", "the scans were taken in the BASE of different corrections.",
+            "Align or assess them one after the other.", "scans",
+        )  # fmt: skip
+    sha256 = next(iter(known), "") or correction_in_force(session, pid)
+    return {CORRECTION: sha256} if sha256 else {}
 
 
 def _scan_files(session: Session, chosen: list[ScanRow], folder: str) -> tuple[dict[str, str], list[str]]:

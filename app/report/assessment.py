@@ -9,10 +9,9 @@ import numpy as np
 
 from alignment.metrics import Assessment
 from app.plan import Plan
-from app.report.build import temperatures
 from app.report.document import Cell, Column, Document, Figure, Heading, Signatures, Table, Text, Verdict
 from app.report.figures import Panel, Scale, Series, histograms_svg, states_svg
-from app.report.known import ScanFacts, record_lines
+from app.report.known import ScanFacts, record_lines, temperatures
 from app.report.package import Pages, Report
 from app.report.pictures import pass_distance_mm
 from app.report.record import Record
@@ -63,7 +62,7 @@ def assessment_report(plan: Plan, data: AssessmentData) -> Report:
     )
     pages.show([_histograms(plan, data, loss), _maps(plan, data, sheet)])
     pages.add(*inputs_of(_named(plan), data.scans))
-    pages.add(Heading(text="Record"), *record_lines(plan, data.scans), Signatures())
+    pages.add(Heading(text="Record"), *record_lines(plan, [s for s in data.scans if s.role != "before"]), Signatures())
     document = Document(
         title="Assessment of an inspection scan",
         subject=plan.part.provenance.name,
@@ -72,7 +71,7 @@ def assessment_report(plan: Plan, data: AssessmentData) -> Report:
         version=version("echobase"),
         blocks=tuple(pages.blocks),
         record=data.record,
-        data={"assessment": data.content, **temperatures(plan)},
+        data={"assessment": data.content, **temperatures(plan, plan.setup.standoff_mm)},
     )
     return Report(document, pages.drawn)
 

@@ -11,7 +11,7 @@ from alignment.metrics import Expected
 from app.plan import Plan
 from app.report.compare import State, comparison
 from app.report.document import Document, Heading, Signatures, Text
-from app.report.known import ScanFacts, record_lines, temperature_mm_per_c
+from app.report.known import ScanFacts, record_lines, temperatures
 from app.report.package import Pages, Report
 from app.report.pictures import Deviation, Shape, deviation_maps, inspection_maps, shape_maps
 from app.report.record import Record
@@ -78,18 +78,13 @@ def alignment_report(plan: Plan, data: ReportData) -> Report:
         version=version("echobase"),
         blocks=tuple(pages.blocks),
         record=data.record,
-        data={"verdict": content["verdict"], "comparison": figures, **temperatures(plan)},
+        data={
+            "verdict": content["verdict"],
+            "comparison": figures,
+            **temperatures(plan, plan.setup.alignment_standoff_mm),
+        },
     )
     return Report(document, pages.drawn)
-
-
-def temperatures(plan: Plan) -> dict[str, float]:
-    """Return what the notes on the water temperature are computed from."""
-    couplant = plan.setup.couplant
-    if couplant.sound_speed_m_s is not None:
-        return {}
-    slope = temperature_mm_per_c(plan, plan.setup.standoff_mm)
-    return {"temperature_c": couplant.temperature_c, "mm_per_c": slope, "standoff_mm": plan.setup.standoff_mm}
 
 
 def _states(data: ReportData) -> tuple[State, ...]:
@@ -105,10 +100,12 @@ def _states(data: ReportData) -> tuple[State, ...]:
 def _how(data: ReportData) -> str:
     shape = (data.correction["non_rigid"] or {}).get("applied") is not None and data.shape is not None
     text = (
-        "What the centre law meets along the whole inspection path if the part is exactly as this scan found it"
+        "What the centre law meets of the part along the whole inspection path, as this scan found it"
         + (", with the shape it has sprung back to" if shape else "")
         + ". ToF is given as one-way distance; amplitude is what the tilt leaves by the calibrated curve. Improvements are "
-        "against the state before. How far the real part may differ from the one found is said by sigma, above."
+        "against the state before. The figures of this correction are what is to be expected, the uncertainty of the estimate "
+        "in them and the robot's own wander not; those of the key-point method take the part to be where this estimate puts "
+        "it. The drawings show the part exactly as found."
     )
     if data.keyed is None and data.correction["method"] != "keypoints":
         text += " The key-point method of the paper finds no answer in these readings."

@@ -27,30 +27,19 @@ class State:
         """Amplitude change through tilt of the poses on the part (n,), dB."""
         return self.seen.db[self.seen.on_part]
 
-    @property
-    def standoff_mm(self) -> Array:
-        """Standoff of the poses on the part (n,), mm."""
-        return self.seen.standoff_mm[self.seen.on_part]
-
     def figures(self, before: "State") -> dict[str, float | None]:
         """Return the figures of this state; improvements against `before`, %."""
         seen = self.seen.summary
-        mean = _mean_abs(self.db)
         return {
             "tof_std_mm": seen.tof_std_mm,
             "tof_range_mm": seen.tof_range_mm,
             "tilt_max_deg": seen.tilt_max_deg,
-            "mean_abs_db": mean,
+            "mean_abs_db": seen.mean_abs_db,
             "within_2db": seen.within_2db,
             "tof_std_improvement_pct": _improvement(before.seen.summary.tof_std_mm, seen.tof_std_mm),
             "tof_range_improvement_pct": _improvement(before.seen.summary.tof_range_mm, seen.tof_range_mm),
-            "amplitude_improvement_pct": _improvement(_mean_abs(before.db), mean),
+            "amplitude_improvement_pct": _improvement(before.seen.summary.mean_abs_db, seen.mean_abs_db),
         }
-
-
-def _mean_abs(values: Array) -> float:
-    known = values[np.isfinite(values)]
-    return float(np.abs(known).mean()) if len(known) else float("nan")
 
 
 def _improvement(before: float, after: float) -> float | None:

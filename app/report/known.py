@@ -129,6 +129,15 @@ def temperature_mm_per_c(plan: Plan, standoff_mm: float) -> float:
     return standoff_mm * slope
 
 
+def temperatures(plan: Plan, standoff_mm: float) -> dict[str, float]:
+    """Return what notes on the water temperature at a standoff are computed from; nothing if the speed of sound is set."""
+    couplant = plan.setup.couplant
+    if couplant.sound_speed_m_s is not None:
+        return {}
+    slope = temperature_mm_per_c(plan, standoff_mm)
+    return {"temperature_c": couplant.temperature_c, "mm_per_c": slope, "standoff_mm": standoff_mm}
+
+
 def _couplant(plan: Plan) -> list[Line]:
     couplant = plan.setup.couplant
     speed = sound_speed_m_s(couplant)

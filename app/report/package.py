@@ -7,7 +7,7 @@ from typing import Any
 
 from pydantic import ValidationError
 
-from app.report.document import Acceptance, Block, Document, Figure
+from app.report.document import Acceptance, Block, Document, Figure, Verdict
 from app.report.html import html
 from app.report.pdf import pdf
 from app.report.plain import csv_text, json_content
@@ -24,11 +24,16 @@ class Report:
     document: Document
     figures: Mapping[str, str]
 
-    def completed(self, record: Record | None, acceptance: Acceptance | None, made: str = "") -> "Report":
-        """Return the report with what came to be known after it was made."""
+    def completed(
+        self, record: Record | None, acceptance: Acceptance | None, made: str = "", outdated: str = ""
+    ) -> "Report":
+        """Return the report with what came to be known after it was made; outdated: why it holds no longer, if so."""
         changed: dict[str, Any] = {"acceptance": acceptance, "made": made or self.document.made}
         if record is not None:
             changed["record"] = record
+        if outdated:
+            said = Verdict(tone="fail", word="OUT OF DATE", text=f"{outdated} What follows does not hold any more.")
+            changed["blocks"] = (said, *self.document.blocks)
         return Report(self.document.model_copy(update=changed), self.figures)
 
     def html(self) -> bytes:

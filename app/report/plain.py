@@ -4,7 +4,7 @@ import csv
 import io
 from typing import Any
 
-from app.report.document import Cell, Document, Line, Lines, Number, Table
+from app.report.document import Cell, Document, Issues, Line, Lines, Number, Table, Verdict
 
 COLUMNS = ("table", "row", "column", "value", "unit")
 # What a spreadsheet would run as a formula.
@@ -21,6 +21,8 @@ def json_content(document: Document) -> dict[str, Any]:
         "version": document.version,
         "figures": list(document.figures()),
         **document.data,
+        "verdicts": [b.word for b in document.blocks if isinstance(b, Verdict)],
+        "issues": [i.model_dump() for b in document.blocks if isinstance(b, Issues) for i in b.issues],
         "acceptance": None if document.acceptance is None else document.acceptance.model_dump(),
         "record": document.record.model_dump(mode="json"),
         "known": {b.title: _known(document, b) for b in document.blocks if isinstance(b, Lines)},
@@ -41,6 +43,11 @@ def csv_text(document: Document) -> bytes:
             for row in block.rows:
                 for column, cell in zip(block.columns[1:], row[1:], strict=True):
                     out.writerow((block.name, _text(row[0]), _safe(column.title), _text(cell), _unit(cell)))
+        elif isinstance(block, Verdict):
+            out.writerow(("report", "verdict", _safe(block.text), _safe(block.word), ""))
+        elif isinstance(block, Issues):
+            for said in block.issues:
+                out.writerow(("issue", said.severity, _safe(said.where), _safe(said.message), ""))
         elif isinstance(block, Lines):
             for line in block.lines:
                 out.writerow(("record", _safe(block.title), _safe(line.label), _safe(_line(document, line)), line.unit))

@@ -72,6 +72,9 @@ def _left_out(plan: Plan) -> Table:
     setup, part = plan.setup, plan.part
     standoff = setup.alignment_standoff_mm
     chord = part.chord_error_mm
+    speed_set = setup.couplant.sound_speed_m_s
+    warm = f"{setup.couplant.temperature_c:g} deg C assumed"
+    assumed = warm if speed_set is None else f"{speed_set:g} m/s as set, at any temperature"
     speed = setup.alignment.scan_speed_mm_s
     rows: list[tuple[Cell, ...]] = [
         (
@@ -82,7 +85,7 @@ def _left_out(plan: Plan) -> Table:
         (
             "Water temperature",
             number(temperature_mm_per_c(plan, standoff), 3, unit="mm/K"),
-            f"shift of the surface at {standoff:g} mm standoff; {setup.couplant.temperature_c:g} deg C assumed",
+            f"shift of the surface at {standoff:g} mm standoff; {assumed}",
         ),
         ("TCP calibration", "see the record", "its error moves the part with the orientation of the tool"),
         ("Probe", "see the record", "order of the laws, pitch and delay as set; amplitude curve as calibrated"),

@@ -5,7 +5,7 @@ from typing import Any
 from sqlalchemy.orm import Session
 
 from app.store.inputs import current
-from app.store.results import latest
+from app.store.results import correction_in_force, latest
 from app.store.scans import all_scans
 from app.store.store import VERSION
 from app.store.tables import INPUT_KINDS, ResultRow
@@ -13,6 +13,7 @@ from app.store.tables import INPUT_KINDS, ResultRow
 IN_WORDS = {
     "part": "the part", "setup": "the setup", "surface": "the inspection surface", "keypoints": "the key points",
     "version": "the version of EchoBase", "plan": "the plan", "scans": "a scan that was deleted",
+    "correction": "the alignment in force",
 }  # fmt: skip
 
 
@@ -34,6 +35,9 @@ def changed_since(session: Session, row: ResultRow) -> list[str]:
     present = {scan.sha256 for scan in all_scans(session, row.project_id)}
     if not set(row.inputs["scans"]) <= present:
         changed.append("scans")
+    # An assessment judges the program of one correction: beside another program it proves nothing.
+    if "correction" in row.inputs and row.inputs["correction"] != correction_in_force(session, row.project_id):
+        changed.append("correction")
     return sorted(set(changed))
 
 

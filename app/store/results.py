@@ -41,6 +41,17 @@ def latest(session: Session, project_id: str, kind: str) -> ResultRow | None:
     return session.scalars(of_kind.order_by(ResultRow.number.desc()).limit(1)).first()
 
 
+CORRECTION = "correction/correction.json"
+
+
+def correction_in_force(session: Session, project_id: str) -> str:
+    """Return the digest of correction.json of the newest alignment of the newest plan; empty where it found none."""
+    plan, alignment = latest(session, project_id, "plan"), latest(session, project_id, "alignment")
+    if plan is None or alignment is None or alignment.inputs["plan"] != plan.sha256 or alignment.verdict == "fail":
+        return ""
+    return files_of(session, project_id, f"alignment:{alignment.number}")[CORRECTION].sha256
+
+
 def get_result(session: Session, project_id: str, kind: str, number: int) -> ResultRow:
     """Return a result; raises Refusal 404."""
     found = (ResultRow.project_id == project_id, ResultRow.kind == kind, ResultRow.number == number)
@@ -63,7 +74,9 @@ def again(session: Session, row: ResultRow) -> ResultRow:
         for name, file in files_of(session, row.project_id, f"{row.kind}:{row.number}").items()
     }
     made = add(session, row.project_id, row.kind, files, row.inputs, row.options, row.verdict, row.summary)
-    made.accepted = row.accepted
+    # It was made when it was made; the journal says when it was taken up again.
+    made.accepted, made.created = row.accepted, row.created
+    note(session, row.project_id, f"{row.kind}-used-again", number=made.number, made_as=row.number)
     return made
 
 

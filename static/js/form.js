@@ -49,19 +49,19 @@ export function withValue(object, path, value) {
 }
 
 /** One field. `change(path, value)` is called with a value that fits the schema, `bad(path, text)` with what is wrong. */
-export function field({ key, path, schema, label }, value, saved, change) {
+export function field({ key, path, schema, label, empty = "auto" }, value, saved, change) {
   const id = uid("f");
   const name = path.join(".");
   const [, unit] = unitOf(key);
   const dirty = JSON.stringify(value ?? null) !== JSON.stringify(saved ?? null);
   const bounds = boundsText(schema, unit);
-  const input = inputFor(schema, value, id, name, bounds, (v) => change(path, v));
+  const input = inputFor(schema, value, id, name, bounds, (v) => change(path, v), empty);
   return h("div", { class: `field ${dirty ? "dirty" : ""} ${schema.type === "string" ? "text" : ""} ${schema.maxLength > LONG ? "wide" : ""}` },
     h("label", { for: id, title: [schema.description, bounds].filter(Boolean).join("  ") }, label ?? title(key)),
     input, h("span", { class: "unit" }, unit));
 }
 
-function inputFor(schema, value, id, name, bounds, change) {
+function inputFor(schema, value, id, name, bounds, change, empty) {
   const common = { id, name, title: bounds };
   if (schema.type === "boolean") return h("input", { ...common, type: "checkbox", checked: Boolean(value), onchange: (e) => change(e.target.checked) });
   const options = schema.choices ?? (schema.enum ?? (schema.const !== undefined ? [schema.const] : null))?.map((o) => [o, o]);
@@ -81,7 +81,7 @@ function inputFor(schema, value, id, name, bounds, change) {
     const high = schema.maximum ?? schema.exclusiveMaximum;
     return h("input", {
       ...common, type: "number", value: value ?? "", step: schema.type === "integer" ? 1 : "any", min: low, max: high,
-      placeholder: schema.nullable ? "auto" : "", required: !schema.nullable,
+      placeholder: schema.nullable ? empty : "", required: !schema.nullable,
       onchange: (e) => {
         if (e.target.value === "" && schema.nullable) return change(null);
         return e.target.checkValidity() ? change(Number(e.target.value)) : e.target.reportValidity();

@@ -36,7 +36,7 @@ def test_prediction_is_the_mean_over_parts_that_the_uncertainty_allows(surface):
     found = after_correction(curved, path, setup, T_found, root @ root.T)
     turn = (T_nominal @ T_found.inv()).rotation_matrix
     centre = T_nominal.points(curved.surface.centroid_part)
-    std2, width, tilt = [], [], []
+    std2, width, tilt, db = [], [], [], []
     for _ in range(150):
         xi = root @ rng.standard_normal(6)
         there = moved(T_nominal, np.r_[turn @ xi[:3], turn @ xi[3:]], centre)
@@ -44,10 +44,13 @@ def test_prediction_is_the_mean_over_parts_that_the_uncertainty_allows(surface):
         std2.append(seen.tof_std_mm**2)
         width.append(seen.tof_range_mm)
         tilt.append(seen.tilt_max_deg)
+        db.append(seen.mean_abs_db)
     # Means of 64 and of 150 draws: each is good to about 60 % over the root of its number.
     assert found.tof_std_mm == pytest.approx(np.sqrt(np.mean(std2)), rel=0.2)
     assert found.tof_range_mm == pytest.approx(np.mean(width), rel=0.2)
     assert found.tilt_max_deg == pytest.approx(np.mean(tilt), rel=0.2)
+    # It goes with the square of the tilt, and scatters twice as much.
+    assert found.mean_abs_db == pytest.approx(np.mean(db), rel=0.4)
 
 
 def test_without_uncertainty_the_corrected_program_sees_the_plan():

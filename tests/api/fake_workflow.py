@@ -118,7 +118,15 @@ def simulate(folder: Path, options: SimulateOptions, output: Path, progress) -> 
 def align(folder: Path, scans, options: AlignOptions, progress):
     text = " ".join(p.read_text(errors="replace") for p in scans)
     verdict = next((v for v in ("fail", "partial") if f"want-{v}" in text), "pass")
-    six = {"x_mm": 1.0, "y_mm": 0.0, "z_mm": 0.0, "a_deg": 0.0, "b_deg": 0.0, "c_deg": 0.0}
+    stood_in = folder / "correction" / "correction.json"
+    six = {
+        "x_mm": 2.0 if options.non_rigid else 1.0,
+        "y_mm": 0.0,
+        "z_mm": 0.0,
+        "a_deg": 0.0,
+        "b_deg": 0.0,
+        "c_deg": 0.0,
+    }
     sha = hashlib.sha256(PROGRAM).hexdigest()
     issues = (
         [{"severity": "error", "code": "bad", "message": "too far.", "remedy": "", "where": ""}]
@@ -132,6 +140,7 @@ def align(folder: Path, scans, options: AlignOptions, progress):
         "keypoints": [],
         "issues": issues,
         "program": sha,
+        "stood_in": hashlib.sha256(stood_in.read_bytes()).hexdigest() if stood_in.exists() else "",
     }
     artifacts = {
         "correction/correction.json": json.dumps(correction).encode(),

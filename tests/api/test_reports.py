@@ -81,6 +81,43 @@ def test_an_earlier_alignment_can_be_put_in_force_again(client):
     assert client.get(f"{address}/programs/corrected").status_code == 200
 
 
+def test_what_was_judged_or_reported_of_another_correction_says_so(client):
+    address = ready(client)
+    sent = client.post(f"{address}/scans", files={"file": ("s.csv", b"x_mm\n2\n")}, data={"base": "corrected"})
+    assert sent.status_code == 201
+    assert client.post(f"{address}/assessments", json={"scans": [2]}).status_code == 202
+    assert aligned_number(client, address, 1, "assessments")["stale"] is False
+    made = client.get(f"{address}/alignments/1").json()["created"]
+    assert client.post(f"{address}/alignments", json={"non_rigid": True}).status_code == 202
+    aligned_number(client, address, 2)
+    # Another program is in force: the proof of the first is none of it, and its report is not the one that counts.
+    judged = client.get(f"{address}/assessments/1").json()
+    assert judged["stale_because"] == ["correction"]
+    assert "OUT OF DATE" in client.get(f"{address}/alignments/1/report").text
+    assert "OUT OF DATE" not in client.get(f"{address}/alignments/2/report").text
+    used = client.post(f"{address}/alignments/1/use").json()
+    assert used["created"] == made
+    assert client.get(f"{address}/assessments/1").json()["stale"] is False
+    assert "OUT OF DATE" not in client.get(f"{address}/alignments/1/report").text
+    setup = client.get(f"{address}/setup").json()
+    client.put(f"{address}/setup", json={**setup, "standoff_mm": 17.0})
+    assert "OUT OF DATE" in client.get(f"{address}/alignments/{used['number']}/report").text
+    error_of(client.post(f"{address}/alignments/2/use"), 409)
+
+
+def test_a_scan_in_the_corrected_base_remembers_which_correction_that_was(client):
+    address = ready(client)
+    sent = client.post(f"{address}/scans", files={"file": ("s.csv", b"x_mm\n2\n")}, data={"base": "corrected"})
+    known = sent.json()["detail"]["correction"]
+    assert len(known) == 64
+    # The file's second alignment reads it in the BASE that it was taken in, not in that of the first.
+    for number in (2, 3):
+        assert client.post(f"{address}/alignments", json={"scans": [2], "non_rigid": number == 3}).status_code == 202
+        aligned_number(client, address, number)
+        files = zipfile.ZipFile(io.BytesIO(client.get(f"{address}/alignments/{number}/files").content))
+        assert json.loads(files.read("correction/correction.json"))["stood_in"] == known
+
+
 def test_a_failed_alignment_cannot_be_put_in_force(client):
     address = ready(client, b"x_mm\n1\n# want-fail\n")
     aligned(client, address)

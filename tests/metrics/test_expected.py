@@ -48,6 +48,7 @@ def test_a_tilted_plane_by_hand() -> None:
     assert seen.summary.tof_std_mm == pytest.approx(distance[on].std())
     assert seen.summary.within_2db == 1.0
     assert seen.summary.tilt_max_deg == pytest.approx(angle)
+    assert seen.summary.mean_abs_db == pytest.approx(2 * 0.5**2 + 1.0**2, abs=5e-3)
 
 
 def test_the_share_within_2_db_counts_poses() -> None:

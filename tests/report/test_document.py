@@ -191,7 +191,9 @@ def seen(distance, db, tilt=0.5) -> Expected:
     d, n = np.asarray(distance, float), len(distance)
     on = np.ones(n, dtype=bool)
     on[-1] = False  # beside the part: takes no part in any figure
-    summary = Prediction(float(d[on].std()), float(np.ptp(d[on])), tilt, 0.5)
+    summary = Prediction(
+        float(d[on].std()), float(np.ptp(d[on])), tilt, 0.5, float(np.abs(np.asarray(db, float)[on]).mean())
+    )
     zero = np.zeros(n)
     return Expected(d, d, zero, zero, zero, np.asarray(db, float), on, summary)
 

@@ -29,8 +29,8 @@ export function content(shell) {
     a.verdict !== "fail" && compare(shell, a, (chosen) => { Object.assign(local, chosen); run(shell, local); }),
     a.verdict !== "pass" && issueList(a.issues, 8),
     follow(shell, a, local),
-    correction(a, setup, hidden(shell)),
-    paper(a, hidden(shell)),
+    correction(a, setup, hidden(shell, a)),
+    paper(a, hidden(shell, a)),
     a.verdict !== "fail" && !a.stale && layers(shell, local),
     before(a),
     sprang(a.non_rigid),
@@ -40,10 +40,11 @@ export function content(shell) {
   ];
 }
 
-/** The offset that the rehearsed scan was made with, if it was one. */
-function hidden(shell) {
-  const scan = shell.project.data.scans?.filter((s) => s.path === "alignment").at(-1);
-  return scan?.origin === "simulated" ? (scan.detail?.options?.offset ?? null) : null;
+/** The offset that the scans of this alignment were rehearsed with, if all of them were, and with the same. */
+function hidden(shell, a) {
+  const scans = (a.options?.scans ?? []).map((n) => shell.project.data.scans?.find((s) => s.number === n));
+  const offsets = scans.map((s) => (s?.origin === "simulated" ? s.detail?.options?.offset : null));
+  return offsets.length && offsets[0] && offsets.every((o) => JSON.stringify(o) === JSON.stringify(offsets[0])) ? offsets[0] : null;
 }
 
 function correction(a, setup, truth) {

@@ -2,7 +2,8 @@
 
 import { post } from "../api.js";
 import { button, h } from "../dom.js";
-import { fixed, mm, pct } from "../format.js";
+import { AXES, fixed, isAngle, mm, pct, poseKey } from "../format.js";
+import { signed } from "../journey.js";
 import { tag, toneOf } from "../status.js";
 
 const KINDS = [["keypoints", "Key points", { method: "keypoints", non_rigid: false }], ["rigid", "Rigid", { method: "map", non_rigid: false }], ["shape", "Non-rigid", { method: "map", non_rigid: true }]];
@@ -28,10 +29,11 @@ export function compare(shell, a, run) {
   const missing = KINDS.filter(([kind]) => !found[kind]);
   const row = (name, of) => h("tr", {}, h("td", {}, name), shown.map(([kind]) => h("td", { class: "num" }, of(found[kind]))));
   const after = (key, show) => (r) => show(r.prediction?.after?.[key]);
-  const take = (r) => (r.number === a.number ? h("span", { class: "soft small" }, "in force") : r.verdict === "fail" ? "" : button("Use", () => use(shell, r), { class: "tiny", key: `use-${r.number}`, title: `Put alignment ${r.number} in force` }));
-  return h("div", { class: "stack" }, h("h3", {}, "Beside each other, predicted for the inspection"),
+  const take = (r) => (r.number === a.number ? h("span", { class: "soft small" }, "in force") : r.verdict === "fail" ? "" : button("Use", () => use(shell, r), { class: "tiny", key: `use-${r.number}`, title: `Put alignment ${r.number} in force`, "aria-label": `Use alignment ${r.number}` }));
+  return h("div", { class: "stack" }, h("h3", {}, "Beside each other, each by its own account"),
     shown.length > 1 && h("table", { class: "compare" }, h("thead", {}, h("tr", {}, [h("th", {}, ""), ...shown.map(([, text]) => h("th", {}, text))])), h("tbody", {},
       row("", (r) => tag(toneOf(r.verdict), r.verdict)),
+      AXES.map((axis) => row(`${axis.toUpperCase()} (${isAngle(axis) ? "deg" : "mm"})`, (r) => signed(r.correction?.[poseKey(axis)], isAngle(axis) ? 4 : 3))),
       row("Distance, std (mm)", after("tof_std_mm", mm)), row("Distance, range (mm)", after("tof_range_mm", mm)),
       row("Largest tilt (deg)", after("tilt_max_deg", (v) => fixed(v, 3))), row("Within 2 dB", after("within_2db", (v) => pct(v))),
       row("Residual, rms (mm)", (r) => mm(r.residual?.rms_mm)), row("Field, largest (mm)", (r) => mm(r.non_rigid?.applied ? r.non_rigid.field_max_mm : null)),

@@ -43,7 +43,7 @@ function groups(shell, local, draft, saved) {
   };
   return fieldsOf(local.schema.record, local.schema.root).map((group) => [
     h("h3", {}, WORDS[group.key] ?? title(group.key)),
-    group.children.map((f) => field(f, at(draft, f.path), at(saved, f.path), change)),
+    group.children.map((f) => field({ ...f, empty: "" }, at(draft, f.path), at(saved, f.path), change)),
   ]);
 }
 

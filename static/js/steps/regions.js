@@ -67,11 +67,11 @@ export function keepOutGroup(shell, local) {
   const list = shell.project.data.setup.inspection.keep_outs ?? [];
   const change = (i, more) => edit(shell, { keep_outs: list.map((k, j) => (j === i ? { ...k, ...more } : k)) });
   const row = (k, i) => h("tr", {},
-    h("td", {}, h("input", { type: "text", name: `keep-name-${i}`, maxlength: 40, "aria-label": "Name", value: k.name, placeholder: `keep-out ${i + 1}`, onchange: (e) => change(i, { name: e.target.value }) })),
+    h("td", {}, h("input", { type: "text", name: `keep-name-${i}`, maxlength: 40, "aria-label": `Name of ${called(k, i)}`, value: k.name, placeholder: called({}, i), onchange: (e) => change(i, { name: e.target.value }) })),
     h("td", { class: "num small" }, sizeOf(k)),
-    h("td", {}, h("input", { type: "number", name: `keep-margin-${i}`, min: 0, step: "any", required: true, "aria-label": "Margin, mm", title: "Margin (mm)", value: k.margin_mm, onchange: (e) => (e.target.checkValidity() ? change(i, { margin_mm: Number(e.target.value) }) : e.target.reportValidity()) })),
-    h("td", {}, h("input", { type: "checkbox", name: `keep-cross-${i}`, checked: k.may_cross, "aria-label": "The tool may pass over it", onchange: (e) => change(i, { may_cross: e.target.checked }) })),
-    h("td", {}, button("×", () => edit(shell, { keep_outs: list.filter((_, j) => j !== i) }), { class: "ghost tiny", key: `keep-del-${i}`, title: "Delete" })));
+    h("td", {}, h("input", { type: "number", name: `keep-margin-${i}`, min: 0, step: "any", required: true, "aria-label": `Margin of ${called(k, i)}, mm`, title: "Margin (mm)", value: k.margin_mm, onchange: (e) => (e.target.checkValidity() ? change(i, { margin_mm: Number(e.target.value) }) : e.target.reportValidity()) })),
+    h("td", {}, h("input", { type: "checkbox", name: `keep-cross-${i}`, checked: k.may_cross, "aria-label": `The tool may pass over ${called(k, i)}`, onchange: (e) => change(i, { may_cross: e.target.checked }) })),
+    h("td", {}, button("×", () => edit(shell, { keep_outs: list.filter((_, j) => j !== i) }), { class: "ghost tiny", key: `keep-del-${i}`, title: "Delete", "aria-label": `Delete ${called(k, i)}` })));
   const send = () => shell.view.send({ brush_mm: local.region, may_cross: local.cross });
   return group(local, "keep", "Keep-out regions", list.length ? String(list.length) : "none",
     list.length > 0 && h("table", { class: "small" }, h("thead", {}, h("tr", {}, ["Name", "Size", "Margin", "Over it", ""].map((t) => h("th", {}, t)))), h("tbody", {}, list.map(row))),
@@ -79,6 +79,9 @@ export function keepOutGroup(shell, local) {
     h("label", { class: "row tight" }, h("input", { type: "checkbox", name: "region-cross", checked: local.cross, onchange: (e) => { local.cross = e.target.checked; send(); } }), "The tool may pass over it"),
     h("div", { class: "row" }, toolButton(shell, "keepout", "Add by a click", "Stop adding", { brush_mm: local.region, may_cross: local.cross })));
 }
+
+/** What a keep-out is called where it has no name. */
+const called = (k, i) => k.name || `keep-out ${i + 1}`;
 
 function sizeOf(k) {
   if (k.type === "sphere" || k.type === "disc") return `R ${fixed(k.radius_mm, 1)}`;

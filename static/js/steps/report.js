@@ -34,9 +34,9 @@ export function content(shell) {
 /** A result's report in every form it comes in. */
 function report(shell, kind, result, text) {
   const path = `${shell.project.path}/${kind}/${result.number}`;
-  const form = (name, word) => link(`${path}/report?format=${name}&download=true`, word, { download: "" });
+  const form = (name, word) => link(`${path}/report?format=${name}&download=true`, word, { download: "", "aria-label": `${text}: ${word}` });
   return h("section", { class: "stack" }, h("h3", {}, text), h("div", { class: "row" },
-    link(`${path}/report`, kind === "alignments" ? "Open the report" : "Open it", { target: "_blank", rel: "noopener" }), form("pdf", "PDF"), form("html", "HTML"), form("csv", "CSV"), form("json", "JSON"), link(`${path}/files`, "Data (zip)", { download: "" })));
+    link(`${path}/report`, kind === "alignments" ? "Open the report" : "Open it", { target: "_blank", rel: "noopener" }), form("pdf", "PDF"), form("html", "HTML"), form("csv", "CSV"), form("json", "JSON"), link(`${path}/files`, "Data (zip)", { download: "", "aria-label": `${text}: data (zip)` })));
 }
 
 const WORDS = [["", "not used"], ["after", "this inspection"], ["before", "from before"]];

@@ -32,7 +32,7 @@ function list(shell, scans) {
 export function drop(shell, local, fixedPath = null) {
   const input = h("input", { type: "file", class: "hidden", multiple: true, onchange: () => send(shell, local, [...input.files], fixedPath) });
   const choice = (name, value, options) => h("select", { name, "aria-label": name, style: { width: "auto" }, onchange: (e) => { local[name] = e.target.value; } }, options.map(([v, text]) => h("option", { value: v, selected: v === value }, text)));
-  const box = h("div", { class: "drop" }, "Drop the readings here", h("span", { class: "faint small" }, "CSV, Parquet, HDF5, MFMC, NDE, PLY, PCD; or poses and readings as two files"),
+  const box = h("div", { class: "drop" }, "Drop the readings here", h("span", { class: "faint small" }, "CSV, Parquet, HDF5, PLY, PCD, XYZ; or poses and readings as two files"),
     h("div", { class: "row tight" }, !fixedPath && choice("path", local.path, [["alignment", "alignment scan"], ["inspection", "inspection scan"], ["corrected", "corrected inspection"]]), choice("base", local.base, [["", "BASE: the file says"], ["nominal", "BASE: nominal"], ["corrected", "BASE: corrected"]])),
     button("Choose files", () => input.click()), input);
   box.addEventListener("dragover", (e) => { e.preventDefault(); box.classList.add("over"); });
