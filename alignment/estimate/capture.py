@@ -57,7 +57,7 @@ def capture(cloud: PointCloud, problem: Problem, start: Transform | None = None,
         follower = Follower(problem.curved, loose=True)
         track = Track(problem.curved, origins[few], distance[few], None if beams is None else beams[few], follower)
     scatter, valid_share, inlier_share, converged = np.inf, 0.0, 0.0, False
-    last, share = np.inf, 1.0
+    last, last_z, share = np.inf, np.zeros(6), 1.0
     for i in range(STEPS):
         weighed = heard if track is every else heard[few]
         found = track.rows(T, problem.centre_mm(T))
@@ -77,14 +77,17 @@ def capture(cloud: PointCloud, problem: Problem, start: Transform | None = None,
         normal = (x * weight[:, None]).T @ x + np.eye(6)
         z = np.asarray(np.linalg.solve(normal, -(x * weight[:, None]).T @ r - problem.total(T)))
         moves = problem.moves_mm(z)
-        # Readings that come and go with the scale can make the steps swing to and fro: then shorter ones.
-        if i > CONVEX_STEPS and moves > 0.8 * last:
+        # Readings that come and go with the scale can make the steps swing to and fro: then shorter ones. Steps that only
+        # creep, as along what a part that sprang back hardly shows, go on as they are.
+        if i > CONVEX_STEPS and moves > 0.8 * last and z @ last_z < 0.0:
             share = max(0.5 * share, LEAST_SHARE)
-        last = moves
+        last, last_z = moves, z
         T = problem.step(T, share * z)
         if i >= CONVEX_STEPS and share * moves < 0.2 * FLOOR_MM:
             if track is every:
                 converged = True
                 break
             track, last, share = every, np.inf, 1.0
+    # A part that sprang back lets the steps creep on along it, by less than its shape differs: near enough to go on from.
+    converged = converged or (track is every and last < max(scatter, FLOOR_MM))
     return Captured(T, converged, float(scatter), valid_share, inlier_share)

@@ -14,7 +14,7 @@ from alignment.estimate.edge_curve import locate
 from alignment.estimate.edge_points import edge_points
 from alignment.estimate.edge_rows import EdgeMap
 from alignment.estimate.locks import LockStrain, lock_strain
-from alignment.estimate.mixture import Mixture, Posterior, mixture, solve
+from alignment.estimate.mixture import Mixture, Posterior, mixture, solve, tail_scale
 from alignment.estimate.noise_fit import NoiseFit, fit_noise, noise_prior
 from alignment.estimate.patches import Patches, condense
 from alignment.estimate.pose_line import PoseLine, pose_line
@@ -125,11 +125,13 @@ def _fitted(
         strain = lock_strain(problem, T, free.covariance[:6, :6]) if i == 0 else strain
         held = held_basis(free.covariance[:6, :6], problem.lock_rows(T))
         state, converged = _settle(state, system, mix, held)
-    state = _plain_if_sprung(state, system, robust.T_base_part, held, stay_on_edges)
+    kept = _plain_if_sprung(state, system, robust.T_base_part, held, stay_on_edges)
+    # The plain fit has settled, even where the careful one ran off after the shape.
+    state, converged = kept, converged or kept is not state
     T = state.T_base_part
     post = _solve(state, system, mix, held)
     scale = problem.prior_sigma
-    covariance = post.covariance[:6, :6]
+    covariance = _claimed(state, system, mix, held, post.covariance[:6, :6])
     found = directions(covariance, held, problem.lock_rows(T), scale, problem.moments_base(T), setup.tolerances)
     now = system.surface(T)
     return MapFit(
@@ -166,10 +168,21 @@ def condense_cloud(
 
 def _solve(state: State, system: System, mix: Mixture, held: Array) -> Posterior:
     """Return the posterior at a state; held (6, h) are directions of the motion."""
+    return solve(*_asked(state, system, mix, held))
+
+
+def _asked(state: State, system: System, mix: Mixture, held: Array) -> tuple[Mixture, Array, Array, Array, Array]:
     rows = system.rows(state.T_base_part, state.nuisance)
     z = np.r_[system.problem.total(state.T_base_part), state.nuisance]
     wide = np.vstack([held, np.zeros((system.unknowns - 6, held.shape[1]))])
-    return solve(mix, rows.r, z, wide, system.problem.off_nominal(state.T_base_part, held))
+    return mix, rows.r, z, wide, system.problem.off_nominal(state.T_base_part, held)
+
+
+def _claimed(state: State, system: System, mix: Mixture, held: Array, covariance: Array) -> Array:
+    """Return the covariance (6, 6) whose 95 % ellipsoid holds 95 %; held directions stay at their prior."""
+    free = np.eye(6) - held @ held.T
+    own = free @ covariance @ free
+    return np.asarray(covariance + (tail_scale(*_asked(state, system, mix, held)) - 1.0) * own)
 
 
 def _settle(state: State, system: System, mix: Mixture, held: Array) -> tuple[State, bool]:

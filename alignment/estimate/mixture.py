@@ -1,8 +1,10 @@
 """The posterior of the motion, averaged over what the noise may be, with some directions held at their nominal value."""
 
 from dataclasses import dataclass
+from functools import lru_cache
 
 import numpy as np
+from scipy.stats import chi2, norm, qmc
 
 from alignment.estimate.noise_fit import NoiseFit, factor, whiten, whiten_back
 from alignment.estimate.noise_kernel import Kernel
@@ -13,6 +15,10 @@ from planner.frames import Array
 LIGHT = 3e-3
 # Designs that differ by less than this share give the same estimate to this share of its standard deviation.
 SAME = 1e-3
+# The region that a covariance claims, and how many samples tell how much of a mixture lies in it.
+REGION, SAMPLES = 0.95, 16_384
+# A direction with less than this share of the motion is one of the nuisances.
+HARDLY = 1e-9
 
 
 @dataclass(frozen=True, eq=False)
@@ -81,18 +87,52 @@ def solve(mix: Mixture, r: Array, z: Array, held: Array, values: Array | None = 
     held (k, h): orthonormal directions whose component of z + step is exactly zero; the rest is solved with them fixed.
     values (h,): how far off nominal they stand, if that is better known than held' z.
     """
-    k = mix.unknowns
-    free = complement(held, k)
-    back = -held @ (held.T @ z if values is None else values)
-    info = mix.information
-    pull = -np.einsum("qnk,n->qk", mix.solved, r) - info @ back - z
-    inverse = np.linalg.inv(free.T @ info @ free + np.eye(free.shape[1]))
-    steps = back + np.einsum("qij,qj->qi", inverse, pull @ free) @ free.T
+    free, steps, inverse = _components(mix, r, z, held, values)
     covariance = free @ np.einsum("q,qij->ij", mix.weights, inverse) @ free.T
     mean = mix.weights @ steps
     d = steps - mean
     covariance += (mix.weights[:, None] * d).T @ d + held @ held.T
     return Posterior(mean, 0.5 * (covariance + covariance.T))
+
+
+def tail_scale(mix: Mixture, r: Array, z: Array, held: Array, values: Array | None = None, known: int = 6) -> float:
+    """Return by how much the covariance of the first `known` unknowns has to grow for its 95 % ellipsoid to hold 95 %.
+
+    A mixture of Gaussians of different widths has heavier tails than the Gaussian of its covariance, as Student's t has;
+    never less than 1. Arguments as of `solve`; by quasi-random samples, the same ones every time.
+    """
+    free, steps, inverse = _components(mix, r, z, held, values)
+    basis, size, _ = np.linalg.svd(free[:known], full_matrices=False)
+    basis = basis[:, size > HARDLY]
+    if not basis.shape[1]:
+        return 1.0
+    to = basis.T @ free[:known]
+    roots = np.linalg.cholesky(to @ inverse @ to.T)
+    d = (steps - mix.weights @ steps)[:, :known] @ basis
+    covariance = np.einsum("q,qij,qkj->ik", mix.weights, roots, roots) + (mix.weights[:, None] * d).T @ d
+    unit = _samples(basis.shape[1] + 1)
+    of = np.minimum(np.searchsorted(np.cumsum(mix.weights), unit[:, 0]), len(mix.weights) - 1)
+    at = d[of] + np.einsum("nij,nj->ni", roots[of], norm.ppf(unit[:, 1:]))
+    m2 = np.einsum("ni,ni->n", at, np.linalg.solve(covariance, at.T).T)
+    return max(1.0, float(np.quantile(m2, REGION) / chi2.ppf(REGION, basis.shape[1])))
+
+
+@lru_cache(maxsize=8)
+def _samples(columns: int) -> Array:
+    """Return quasi-random points (n, columns) in the unit cube."""
+    return np.asarray(qmc.Sobol(columns, scramble=True, rng=np.random.default_rng(20261)).random(SAMPLES))
+
+
+def _components(mix: Mixture, r: Array, z: Array, held: Array, values: Array | None) -> tuple[Array, Array, Array]:
+    """Return a basis of what is free (k, f), and per model its step (q, k) and covariance (q, f, f)."""
+    k = mix.unknowns
+    free = complement(held, k)
+    back = -held @ (held.T @ z if values is None else values)
+    info = mix.information
+    pull = -np.einsum("qnk,n->qk", mix.solved, r) - info @ back - z
+    inverse = np.asarray(np.linalg.inv(free.T @ info @ free + np.eye(free.shape[1])))
+    steps = back + np.einsum("qij,qj->qi", inverse, pull @ free) @ free.T
+    return free, steps, inverse
 
 
 def complement(held: Array, k: int) -> Array:

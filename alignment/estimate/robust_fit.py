@@ -40,7 +40,7 @@ class RobustFit:
 def robust_fit(patches: Patches, problem: Problem, start: Transform, edges: EdgeData | None) -> RobustFit:
     """Return the placement of a robust fit (Tukey's biweight, scales from the data) of patches and crossings together."""
     T, settled = start, False
-    last, share = np.inf, 1.0
+    last, last_z, share = np.inf, np.zeros(6), 1.0
     used = np.zeros(len(patches), dtype=bool)
     base = np.minimum(patches.count, 50.0)
     base = base / (1.0 + base)
@@ -65,9 +65,9 @@ def robust_fit(patches: Patches, problem: Problem, start: Transform, edges: Edge
         nuisance = nuisance + z[6:]
         moves = problem.moves_mm(z[:6])
         # Rows that come and go with the scale can make the steps swing to and fro: then shorter ones.
-        if i > ANNEALED and moves > 0.8 * last:
+        if i > ANNEALED and moves > 0.8 * last and z[:6] @ last_z < 0.0:
             share = max(0.5 * share, LEAST_SHARE)
-        last = moves
+        last, last_z = moves, z[:6]
         if moves < SETTLED_MM and i >= (3 if edges is None else ANNEALED):
             settled = True
             break

@@ -107,3 +107,15 @@ def test_a_true_part_gets_the_rigid_program_whatever_was_asked_for(folder):
     programs = [{k: v for k, v in d.artifacts.items() if k.endswith((".src", ".dat"))} for d in done.values()]
     assert programs[0]
     assert programs[0] == programs[1]
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(("twist_mm", "seed"), [(1.5, 105), (-2.0, 106), (-3.0, 107)])
+def test_a_twisted_part_is_neither_lost_nor_taken_for_a_wrong_input(folder, twist_mm, seed):
+    """The first search crept along the twist without end; the careful fit of -3 mm ran off after the shape."""
+    plan = load_plan(folder)
+    truth = Truth(OFFSET, spring_back_field(plan.surface, "twist", twist_mm))
+    taken = scan(folder, "alignment", truth, true_shape(plan.surface, truth), f"twist{seed}.csv", seed, outliers=0.1)
+    done = run_align(folder, [taken], AlignOptions(non_rigid=True), quiet)
+    assert done.correction["verdict"] != "fail", done.correction["issues"]
+    assert not {"laws-reversed", "array-turned", "no-convergence"} & {i["code"] for i in done.correction["issues"]}
