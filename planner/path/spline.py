@@ -93,31 +93,33 @@ def slerp(p: Array, q: Array, f: Array) -> Array:
     return np.asarray(out / np.linalg.norm(out, axis=1, keepdims=True))
 
 
-def chord_deviation(xyz: Array, wxyz: Array, knot: Ints, interval: Ints) -> tuple[Array, Array]:
-    """Return how far, mm and rad, each dense pose (n,) lies from the straight motion of its interval between knots."""
-    a, b = knot[interval], knot[interval + 1]
-    d = xyz[b] - xyz[a]
-    f = np.einsum("ij,ij->i", xyz - xyz[a], d) / np.maximum(np.einsum("ij,ij->i", d, d), 1e-12)
+def chord_deviation(y: Array, knots: Array, interval: Ints) -> tuple[Array, Array]:
+    """Return how far, mm and rad, each dense pose y (n, 7) lies from the straight motion between knots (k, 7).
+
+    Rows are X Y Z (mm) and quaternion wxyz; interval (n,): of each dense pose, the index of its first knot.
+    """
+    xyz, a, b = y[:, :3], knots[interval], knots[interval + 1]
+    d = b[:, :3] - a[:, :3]
+    f = np.einsum("ij,ij->i", xyz - a[:, :3], d) / np.maximum(np.einsum("ij,ij->i", d, d), 1e-12)
     f = np.clip(f, 0.0, 1.0)
-    away = np.linalg.norm(xyz - xyz[a] - f[:, None] * d, axis=1)
-    return away, angle_between(wxyz, slerp(wxyz[a], wxyz[b], f))
+    away = np.linalg.norm(xyz - a[:, :3] - f[:, None] * d, axis=1)
+    return away, angle_between(y[:, 3:], slerp(a[:, 3:], b[:, 3:], f))
 
 
 def spline_deviation(
-    xyz: Array, wxyz: Array, s: Array, knot: Ints, interval: Ints, block: NDArray[np.integer], ends: EndRule
+    y: Array, share: Array, knots: Array, interval: Ints, block: NDArray[np.integer], ends: EndRule
 ) -> tuple[Array, Array]:
-    """Return how far, mm and rad, each dense pose (n,) lies from the spline through the knots.
+    """Return how far, mm and rad, each dense pose y (n, 7) lies from the spline through knots (k, 7), block (k,).
 
-    s (n,): arc length of the dense poses; the nearest point of the spline is sought from the same share of the interval.
+    share (n,): how far along its interval a dense pose is, 0..1; the nearest point of the spline is sought from there.
     """
-    curve = spline(xyz[knot], wxyz[knot], block[knot].astype(np.int64), ends)
+    curve = spline(knots[:, :3], knots[:, 3:], block.astype(np.int64), ends)
     h = curve.t[interval + 1] - curve.t[interval]
-    s0, s1 = s[knot[interval]], s[knot[interval + 1]]
-    u = h * np.clip((s - s0) / np.maximum(s1 - s0, 1e-12), 0.0, 1.0)
+    u = h * share
     value, slope = curve.at(interval, u)
     speed = np.einsum("ij,ij->i", slope[:, :3], slope[:, :3])
-    shift = np.einsum("ij,ij->i", xyz - value[:, :3], slope[:, :3]) / np.maximum(speed, 1e-12)
+    shift = np.einsum("ij,ij->i", y[:, :3] - value[:, :3], slope[:, :3]) / np.maximum(speed, 1e-12)
     u = np.clip(u + shift, 0.0, h)
     value, _ = curve.at(interval, u)
     q = value[:, 3:] / np.linalg.norm(value[:, 3:], axis=1, keepdims=True)
-    return np.linalg.norm(xyz - value[:, :3], axis=1), angle_between(wxyz, q)
+    return np.linalg.norm(y[:, :3] - value[:, :3], axis=1), angle_between(y[:, 3:], q)

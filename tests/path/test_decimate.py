@@ -162,6 +162,31 @@ def test_tolerances_are_honoured_when_tightened() -> None:
     assert max(mine[1], mine[3]) <= 0.02
 
 
+@pytest.mark.parametrize("acquired_mm", [0.7, 2.0, 4.0, 8.0])
+def test_the_spacing_of_the_acquisition_does_not_set_that_of_the_robot(acquired_mm: float) -> None:
+    dense = raster(
+        curved_of(plate(1500.0, 100.0)), setup_of(strategy="plane", step_mm=40.0, point_spacing_mm=acquired_mm)
+    )
+    sparse = decimate(dense)
+    data = np.flatnonzero(sparse.is_data & (sparse.pass_id == 0))
+    d = np.linalg.norm(np.diff(sparse.Ts_part_tcp.xyz_mm[data], axis=0), axis=1)
+    # 1490 mm in as few pieces of at most 15 mm as there can be, but for those that grow from the 10 mm of the lead.
+    assert len(d) <= np.ceil(1490.0 / 15.0) + 2
+    assert d.max() <= 15.0
+
+
+def test_poses_between_those_of_the_acquisition_stand_on_the_surface_and_face_it() -> None:
+    sparse = decimate(raster(curved_of(tube(360, 20)), crystal(strategy="plane", step_mm=100.0)))
+    data = sparse.take(sparse.is_data)
+    axes, p = data.Ts_part_tcp.rotation_matrix, data.Ts_part_tcp.xyz_mm
+    radius = np.linalg.norm(p[:, 1:], axis=1)
+    assert np.abs(radius - 115.0).max() < 2e-3
+    out = p * [0.0, 1.0, 1.0] / radius[:, None]
+    assert np.degrees(np.arccos(np.clip(np.einsum("ij,ij->i", -axes[:, :, 2], out), -1.0, 1.0))).max() < 0.01
+    assert (np.abs(data.bary.sum(axis=1) - 1.0) < 1e-9).all()
+    assert data.bary.min() > -1e-9
+
+
 def test_nonsense_tolerances_are_refused() -> None:
     with pytest.raises(EchoBaseError, match="max_ratio"):
         decimate(dense_path("twist"), max_ratio=1.0)
