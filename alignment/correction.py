@@ -43,7 +43,8 @@ class Correction:
     T_base_basecorr: the correction; None where nothing could be estimated (then the verdict is fail). covariance (6, 6)
     of xi = (rx, ry, rz, x, y, z), rad and mm, axes of base: T_true = Tr(c) Exp(xi) Tr(-c) T_estimated about c =
     `centroid_mm` (3,). `points_base` (p, 3) and `deviation_mm` (p,): residual of each patch used, for maps.
-    baseline: the key-point method's T_base_basecorr beside it, where it gives one.
+    baseline: the key-point method's T_base_basecorr beside it, where it gives one. surfaces: of scans of several plans
+    aligned together, how far the readings of each stand off the part where all of them put it.
     """
 
     method: Method
@@ -63,6 +64,7 @@ class Correction:
     noise: dict[str, float] = field(default_factory=dict)
     edges: dict[str, Any] | None = None
     non_rigid: dict[str, Any] | None = None
+    surfaces: list[dict[str, Any]] | None = None
     points_base: Array = field(default_factory=lambda: np.zeros((0, 3)))
     deviation_mm: Array = field(default_factory=lambda: np.zeros(0))
 
@@ -106,6 +108,7 @@ class Correction:
             "noise": self.noise,
             "edges": self.edges,
             "non_rigid": self.non_rigid,
+            "surfaces": self.surfaces,
             "issues": [i.to_json() for i in self.issues],
             "inputs": {},
         }

@@ -70,14 +70,14 @@ def align(
             )
         )
     keyed = match_keypoints(cloud, curved, keypoints, setup, found.T_base_part)
-    keyed = tuple(_with_residual(k, found.patches, found.rows, found.used, setup) for k in keyed)
-    return _finish(
+    keyed = tuple(with_residual(k, found.patches, found.rows, found.used, setup) for k in keyed)
+    return finish(
         problem, method, found.T_base_part, found.covariance, found.directions, found.patches, found.rows, found.used,
         keyed, issues, inspection, baseline, found.noise.named(), found.edges,
     )  # fmt: skip
 
 
-def _finish(
+def finish(
     problem: Problem,
     method: Method,
     T_base_part: Transform,
@@ -93,6 +93,7 @@ def _finish(
     noise: dict[str, float],
     edges: dict | None,
 ) -> Correction:
+    """Return the correction of a placement: residuals, limits, directions, outlook and verdict of one plan's surface."""
     setup, curved = problem.setup, problem.curved
     centre = problem.centre_mm(T_base_part)
     T_base_basecorr = problem.T_base_basecorr(T_base_part)
@@ -130,7 +131,7 @@ def _finish(
         before=before,
         after=after,
         issues=tuple(issues),
-        baseline=_baseline(problem, baseline),
+        baseline=baseline_of(problem, baseline),
         noise=noise,
         edges=edges,
         points_base=rows.foot_base[picked],
@@ -163,13 +164,14 @@ def residual_of(patches: Patches, rows: Rows, used: NDArray[np.bool_]) -> Residu
     return Residual(rms, p95, float(np.abs(r).max()), kept)
 
 
-def _baseline(problem: Problem, baseline: KeyPointFit | None) -> Transform | None:
+def baseline_of(problem: Problem, baseline: KeyPointFit | None) -> Transform | None:
+    """Return the correction that the key-point method asks for, if it finds one."""
     if baseline is None or baseline.T_base_part is None:
         return None
     return problem.T_base_basecorr(baseline.T_base_part)
 
 
-def _with_residual(
+def with_residual(
     match: KeyPointMatch, patches: Patches, rows: Rows, used: NDArray[np.bool_], setup: Setup
 ) -> KeyPointMatch:
     """Return the match with the mean residual, along the normal, of the patches around it."""
@@ -192,7 +194,7 @@ def _by_keypoints(
             if fit
             else (Issue("error", "no-keypoints", "there are no key points.", "Choose at least three."),)
         )
-        return _empty(problem, "keypoints", [*cloud.issues, *said], () if fit is None else fit.matches, None)
+        return empty(problem, "keypoints", [*cloud.issues, *said], () if fit is None else fit.matches, None)
     T = fit.T_base_part
     centre = problem.centre_mm(T)
     patches = condense_cloud(cloud, problem, T)
@@ -204,7 +206,7 @@ def _by_keypoints(
     scale = problem.prior_sigma
     none = np.zeros((6, 0))
     found = directions(covariance, none, none.T, scale, problem.moments_base(T), problem.setup.tolerances)
-    return _finish(
+    return finish(
         problem, "keypoints", T, covariance * np.outer(scale, scale), found, patches, rows, used, fit.matches,
         [*cloud.issues, *fit.issues], inspection, fit, {}, None,
     )  # fmt: skip
@@ -232,16 +234,17 @@ def _nothing(
     cloud: PointCloud, problem: Problem, baseline: KeyPointFit | None, captured: Captured, method: Method
 ) -> Correction:
     issues = [*cloud.issues, *diagnose_lost(cloud, problem, captured)]
-    return _empty(problem, method, issues, () if baseline is None else baseline.matches, _baseline(problem, baseline))
+    return empty(problem, method, issues, () if baseline is None else baseline.matches, baseline_of(problem, baseline))
 
 
-def _empty(
+def empty(
     problem: Problem,
     method: Method,
     issues: list[Issue],
     matches: tuple[KeyPointMatch, ...],
     baseline: Transform | None,
 ) -> Correction:
+    """Return the failed correction of readings that determine nothing."""
     return Correction(
         method, "fail", problem.setup, None, None, None, (), (), matches, None, None, None, tuple(issues), baseline
     )

@@ -89,15 +89,15 @@ def align_map(
     line = None if cloud.beams_base is None else pose_line(cloud, setup.probe)
     patches = condense_cloud(cloud, problem, captured.T_base_part, line)
     crossed = edge_data(cloud, problem, line) if edges else None
-    found = _fitted(problem, captured, patches, crossed, stay_on_edges)
+    found = fit_captured(problem, captured, patches, crossed, stay_on_edges)
     if isinstance(found, MapFit) and not same_afresh(patches, curved, found.T_base_part, found.rows):
         # Feet that were followed over a fold: now every patch asks the whole surface at every step.
         strict = replace(patches, follower=Follower(curved))
-        found = _fitted(problem, captured, strict, crossed, stay_on_edges)
+        found = fit_captured(problem, captured, strict, crossed, stay_on_edges)
     return found
 
 
-def _fitted(
+def fit_captured(
     problem: Problem, captured: Captured, patches: Patches, crossed: EdgeData | None, stay_on_edges: bool
 ) -> MapFit | Captured:
     setup, curved = problem.setup, problem.curved

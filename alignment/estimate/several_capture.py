@@ -11,7 +11,7 @@ from alignment.estimate.problem import Problem
 from alignment.estimate.robust import huber_weights, mad_sigma, tukey_weights
 from alignment.estimate.several_rows import Member
 from alignment.estimate.surface_rows import Rows, Track
-from planner.frames import Array, Transform
+from planner.frames import Array
 from planner.setup import Setup
 
 LEAST_SHARE = 1.0 / 16.0
@@ -39,9 +39,7 @@ def capture_several(
         centre = problem.centre_mm(T)
         figures = []
         for member, track, weight in zip(members, tracks, heard, strict=True):
-            found = member.in_first(
-                track.rows(member.placed(T), member.T_first_own.inv().points(centre)), centre
-            )
+            found = member.in_first(track.rows(member.placed(T), member.T_first_own.inv().points(centre)), centre)
             figures.append(_add(found, weight, problem.prior_sigma, i < CONVEX_STEPS, normal, pull))
         z = np.asarray(np.linalg.solve(normal, pull))
         moves = problem.moves_mm(z)

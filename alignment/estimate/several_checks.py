@@ -63,7 +63,7 @@ def _same_place(first_name: str, first: Setup, name: str, setup: Setup) -> list[
             )
         ]
     place, other = (s.T_world_base @ s.T_base_partnom for s in (first, setup))
-    off = place.inv() @ other.renamed("world", "part") if False else place.rigid.inv() * other.rigid
+    off = place.rigid.inv() * other.rigid
     shift, turn = float(np.linalg.norm(off.translation)), float(np.degrees(off.rotation.magnitude()))
     if shift <= SAME_MM and turn <= SAME_DEG:
         return []

@@ -22,6 +22,8 @@ from planner.surface.curved import CurvedSurface
 
 # Path put between the scans (mm): what wandered in one of them says nothing of the next.
 BETWEEN_MM = 1e4
+# Numbers set aside for the passes of one scan.
+PASSES = 100_000
 
 
 @dataclass(frozen=True, eq=False)
@@ -107,10 +109,6 @@ def _joined_cells(parts: Sequence[Cells]) -> Cells:
     return Cells(*(np.concatenate([getattr(c, f.name) for c in out]) for f in fields(Cells)))
 
 
-# Numbers set aside for the passes of one scan.
-PASSES = 100_000
-
-
 @dataclass(frozen=True, eq=False)
 class SeveralEdges(EdgeData):
     """The crossings of several scans; `points` are theirs one after the other in the first plan's base.
@@ -136,11 +134,6 @@ class SeveralEdges(EdgeData):
             conormal = member.T_first_own.directions(found.jacobian[:, 3:])
             out.append(replace(found, jacobian=motion_rows(point, conormal, centre), point_base=point))
         return EdgeRows(*(np.concatenate([getattr(r, f.name) for r in out]) for f in fields(EdgeRows)))
-
-    def of_member(self, i: int) -> slice:
-        """Return which crossings are those of a scan."""
-        sizes = [0 if p is None else len(p.points) for p in self.parts]
-        return slice(sum(sizes[:i]), sum(sizes[: i + 1]))
 
 
 def joined_edges(members: Sequence[Member], parts: Sequence[EdgeData | None]) -> SeveralEdges | None:

@@ -161,7 +161,7 @@ def _adapted(plan: Plan, found: Correction, fit: FieldFit, field: Field) -> Foll
     T_base_basecorr = correction(T, setup.T_base_partnom)
     explained = residual.rms_mm <= setup.tolerances.position_mm and field.lengths_mm.min() >= setup.probe.swath_mm
     overtaken = (*ABOUT_MISFIT, *ABOUT_LAWS) if explained else ABOUT_MISFIT
-    issues = [i for i in found.issues if i.code not in overtaken]
+    issues = [_of_shape(i) for i in found.issues if i.code not in overtaken]
     issues += limit_issues(*nominal_shift(setup, T, plan.surface.centroid_part), setup)
     issues += residual_issues(residual.rms_mm, setup)
     issues += _shape_issues(plan, fit, field)
@@ -186,6 +186,14 @@ def _adapted(plan: Plan, found: Correction, fit: FieldFit, field: Field) -> Foll
     )
     npz = field_npz(field, plan.curved)
     return Followed(found, dense, sent, True, before, keyed, after, -fit.rest_mm[picked], npz)
+
+
+def _of_shape(issue: Issue) -> Issue:
+    """Return what a rigid fit said of the edges with the remedy that is left once the shape is followed."""
+    if issue.code != "off-edges":
+        return issue
+    remedy = "The shape is followed along the normal only: in the plane trust the correction no better than this."
+    return replace(issue, remedy=remedy)
 
 
 def _shape_issues(plan: Plan, fit: FieldFit, field: Field) -> list[Issue]:

@@ -17,8 +17,10 @@ from alignment.point_cloud import point_cloud
 from alignment.simulator import Noise, Truth, simulate
 from app.plan import Artifacts, Plan
 from app.samples import sample
+from app.steps.non_rigid import follow
 from app.steps.plan import PlanRequest, run_plan
-from app.steps.programs import active_base
+from app.steps.programs import active_base, export_path, program_name
+from kuka_export.options import ProgramOptions
 from kuka_export.reader import read_program
 from planner.errors import EchoBaseError, fail
 from planner.frames import Array, Transform
@@ -49,11 +51,17 @@ class _Cell:
     plan: Plan
     files: Artifacts
 
-    def scan(self, kind: str, truth: Truth, seed: int, T_base_basecorr: Transform | None = None) -> Any:
+    def scan(
+        self,
+        kind: str,
+        truth: Truth,
+        seed: int,
+        T_base_basecorr: Transform | None = None,
+        files: Artifacts | None = None,
+    ) -> Any:
         """Return the cloud of a simulated scan; with a correction the program runs in the corrected BASE."""
-        text = {
-            n.split("/")[1]: b for n, b in self.files.items() if n.startswith(f"{kind}/") and n[-4:] in (".src", ".dat")
-        }
+        files = self.files if files is None else files
+        text = {n.split("/")[1]: b for n, b in files.items() if n.startswith(f"{kind}/") and n[-4:] in (".src", ".dat")}
         reading, setup = read_program(text), self.plan.setup
         base = active_base(reading, setup)
         if T_base_basecorr is not None:
@@ -117,12 +125,15 @@ def aerofoil(seeds: int, progress: Progress) -> Table:
     trial = _after(cell, Truth(offset, 1.0), 1000, "map")
     spring = PAPER_AEROFOIL["after"][0] / trial[0]
     truth = Truth(offset, spring)
-    figures: dict[str, list[tuple[float, float]]] = {"no correction": [], "key points": [], "MAP, rigid": []}
+    figures: dict[str, list[tuple[float, float]]] = {
+        name: [] for name in ("no correction", "key points", "MAP, rigid", "MAP, non-rigid")
+    }
     for k in range(seeds):
         progress(0.4 + 0.6 * k / seeds, f"seed {k}")
         figures["no correction"].append(_spread(cell, cell.scan("inspection", truth, k), truth))
         figures["key points"].append(_after(cell, truth, k, "keypoints"))
         figures["MAP, rigid"].append(_after(cell, truth, k, "map"))
+        figures["MAP, non-rigid"].append(_after_following(cell, truth, k))
     lines = [
         f"Aerofoil 1.5 m, single crystal, 2 mm raster, sprung back by {spring:.2f} mm at most. ToF of the full scan, mm.",
         f"Noise {NOISE_TEXT}. Seeds 0 to {seeds - 1}; median (largest).",
@@ -167,6 +178,20 @@ def _after(cell: _Cell, truth: Truth, seed: int, method: str) -> tuple[float, fl
     if found.T_base_basecorr is None:
         raise fail("reproduce-failed", f"the {method} method found nothing on seed {seed}.", "Report this.")
     return _spread(cell, cell.scan("inspection", truth, seed + 500, found.T_base_basecorr), truth)
+
+
+def _after_following(cell: _Cell, truth: Truth, seed: int) -> tuple[float, float]:
+    """Return the spread that the program adapted to the part's shape leaves: it is exported, read back and run."""
+    plan, cloud = cell.plan, cell.scan("alignment", truth, seed)
+    rigid = align(cloud, plan.curved, plan.keypoints, plan.setup, plan.inspection, "map", None, True)
+    followed = follow(plan, cloud, rigid, True)
+    T = followed.found.T_base_basecorr
+    if T is None or followed.found.failed:
+        raise EchoBaseError(*errors_in(followed.found.issues))
+    options = ProgramOptions(adapted=followed.adapted)
+    name = program_name(plan.part, "corrected")
+    program = export_path(plan, followed.sent, followed.dense, name, T_base_basecorr=T, options=options)
+    return _spread(cell, cell.scan("corrected", truth, seed + 500, T, program.files), truth)
 
 
 def _spread(cell: _Cell, cloud: Any, truth: Truth) -> tuple[float, float]:
