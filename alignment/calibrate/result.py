@@ -12,6 +12,7 @@ from planner.issues import Issue
 
 Status = Literal["measured", "weak", "held"]
 Kind = Literal["tilt", "couplant", "tcp"]
+Target = Literal["plane", "sphere"]
 
 
 @dataclass(frozen=True)

@@ -5,7 +5,8 @@ from pathlib import Path
 import numpy as np
 
 from alignment.calibrate.couplant import calibrate_couplant
-from alignment.calibrate.result import Calibration, Kind
+from alignment.calibrate.result import Calibration, Kind, Target
+from alignment.calibrate.sphere import calibrate_tcp_sphere
 from alignment.calibrate.tables import read_table
 from alignment.calibrate.tcp import calibrate_tcp
 from alignment.calibrate.tilt import calibrate_tilt
@@ -16,12 +17,14 @@ from planner.frames import Array
 from planner.setup import Setup
 
 
-def calibrate(kind: Kind, paths: list[Path], setup: Setup) -> Calibration:
+def calibrate(
+    kind: Kind, paths: list[Path], setup: Setup, target: Target = "plane", radius_mm: float | None = None
+) -> Calibration:
     """Return the calibration of files.
 
     tilt: CSV with b_deg, c_deg, amplitude_pct. couplant: CSV with tof_us, gap_mm or step_mm, and optionally echo (1, 2,
-    ...). tcp: a scan of a fixed flat target in any scan format. Several files of a kind are taken together (tcp: one scan,
-    which may be of two files). Raises EchoBaseError.
+    ...). tcp: a scan of a fixed target in any scan format: a plane, or a sphere of radius_mm (None: to be found). Several
+    files of a kind are taken together (tcp: one scan, which may be of two files). Raises EchoBaseError.
     """
     if not paths:
         raise fail("calibration-file", "There is no file to calibrate from.", "Name at least one.")
@@ -31,7 +34,7 @@ def calibrate(kind: Kind, paths: list[Path], setup: Setup) -> Calibration:
             raise fail(
                 "calibration-file", "A point cloud does not show the probe.", "Use ultrasonic readings with poses."
             )
-        return calibrate_tcp(scan, setup)
+        return calibrate_tcp(scan, setup) if target == "plane" else calibrate_tcp_sphere(scan, setup, radius_mm)
     if kind == "tilt":
         columns = _joined(paths, ("b_deg", "c_deg", "amplitude_pct"), ())
         return calibrate_tilt(columns["b_deg"], columns["c_deg"], columns["amplitude_pct"])

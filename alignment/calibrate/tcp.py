@@ -4,20 +4,22 @@ import numpy as np
 from scipy.optimize import least_squares
 from scipy.spatial.transform import Rotation
 
-from alignment.calibrate.result import Calibration, Estimate, Status, factor_95
+from alignment.calibrate.result import Calibration
 from alignment.calibrate.tcp_poses import PlaneViews, plane_views
+from alignment.calibrate.tcp_result import PRIOR, split_held, tcp_estimates, tcp_patch
 from alignment.scan import Scan
 from planner.errors import fail
-from planner.frames import Array, Transform
-from planner.issues import Issue
-from planner.probe import tool_axes
-from planner.setup import Pose, Setup
+from planner.frames import Array
+from planner.setup import Setup
 
-AXES = ("c", "b", "a", "x", "y", "z")
-# What may be wrong with a taught TCP before anything is measured, one sigma: turns (rad), shifts (mm).
-PRIOR = np.r_[np.full(3, np.radians(1.5)), np.full(3, 2.0)]
-HELD_SHARE, HELD_ROW = 0.5, 0.25
-MEASURED = np.r_[np.full(3, np.radians(0.05)), np.full(3, 0.1)]
+ADVICE = {
+    "a": "Tilt the probe about its array axis in more poses.",
+    "b": "Turn the probe about the beam by 180 deg in some poses.",
+    "c": "Record amplitudes with the probe tilted about its array axis: distances alone do not show this turn.",
+    "x": "Tilt farther, to both sides, about y.",
+    "y": "Tilt farther, to both sides, about x.",
+    "z": "A plane shows the length of the tool hardly at all: use a sphere of known radius, or a known gap.",
+}
 NOISE_ROUNDS = 5
 OUTLIER_SIGMAS = 4.5
 
@@ -35,35 +37,20 @@ def calibrate_tcp(scan: Scan, setup: Setup) -> Calibration:
     problem = _Problem(views, setup)
     basis = np.eye(6)
     solution, covariance, dof, rms = problem.solve(basis)
-    whitened = covariance / np.outer(PRIOR, PRIOR)
-    values, vectors = np.linalg.eigh(whitened)
-    held = np.sqrt(np.maximum(values, 0.0)) > HELD_SHARE
-    if held.all():
+    kept, held = split_held(covariance)
+    if kept.shape[1] == 0:
         raise fail(
             "tcp-readings",
             "These poses show nothing of the TCP.",
             "Tilt the probe both ways by 2 deg or more about x and y, and turn it about the beam by 90 and 180 deg.",
             scan.name,
         )
-    if held.any():
-        basis = PRIOR[:, None] * vectors[:, ~held]
+    if held.shape[1]:
+        basis = PRIOR[:, None] * kept
         solution, covariance, dof, rms = problem.solve(basis)
-    row = np.linalg.norm(vectors[:, held], axis=1)
-    estimates, issues = {}, []
-    for i, axis in enumerate(AXES):
-        scale, unit = (180.0 / np.pi, "deg") if i < 3 else (1.0, "mm")
-        sigma = float(np.sqrt(covariance[i, i]))
-        status: Status = "held" if row[i] > HELD_ROW else "measured" if sigma <= MEASURED[i] else "weak"
-        if status == "held":
-            sigma = float(PRIOR[i])
-        estimates[axis] = Estimate(
-            float(solution[i] * scale), sigma * scale, sigma * scale * factor_95(dof), unit, status
-        )
-        if status != "measured":
-            issues.append(_say(axis, estimates[axis]))
-    patch = {"tool": {"tcp": {k: round(v, 6) for k, v in _patched(solution, setup).model_dump().items()}}}
+    estimates, issues = tcp_estimates(solution, covariance, held, dof, ADVICE)
     curves = {"distance_mm": views.middle_mm, "slope": views.slope, "level_db": views.level_db}
-    return Calibration("tcp", estimates, patch, len(scan), rms, "mm", tuple(issues), curves)
+    return Calibration("tcp", estimates, tcp_patch(solution, setup), len(scan), rms, "mm", tuple(issues), curves)
 
 
 class _Problem:
@@ -153,27 +140,3 @@ def _by_pose(jacobian: Array, residual: Array, pose: Array, covariance: Array) -
         score = j.T @ np.linalg.solve(own, residual[rows])
         middle = middle + np.outer(score, score)
     return np.asarray(covariance @ middle @ covariance)
-
-
-def _patched(error: Array, setup: Setup) -> Pose:
-    """Return `tool.tcp` of the tool as taught with the error of EchoBase's TCP applied."""
-    axes = tool_axes(setup.tool)
-    turn = Transform.from_parts("tcp", "tcp", Rotation.from_rotvec(error[:3]), error[3:])
-    return Pose.of(setup.tool.tcp.transform("flange", "tcp") @ axes @ turn @ axes.inv())
-
-
-def _say(axis: str, estimate: Estimate) -> Issue:
-    advice = {
-        "a": "Tilt the probe about its array axis in more poses.",
-        "b": "Turn the probe about the beam by 180 deg in some poses.",
-        "c": "Record amplitudes with the probe tilted about its array axis: distances alone do not show this turn.",
-        "x": "Tilt farther, to both sides, about y.",
-        "y": "Tilt farther, to both sides, about x.",
-        "z": "A plane shows the length of the tool hardly at all: check it against a known gap.",
-    }[axis]
-    if estimate.status == "held":
-        return Issue(
-            "info", "tcp-held", f"{axis.upper()} of the TCP stays as taught: these poses do not show it.", advice, axis
-        )
-    text = f"{axis.upper()} of the TCP is known to +-{estimate.half_95:.3g} {estimate.unit} (95 %) only."
-    return Issue("warning", "tcp-weak", text, advice, axis)

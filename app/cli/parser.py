@@ -53,6 +53,13 @@ def _share(text: str) -> float:
     return value
 
 
+def _positive(text: str) -> float:
+    value = float(text)
+    if not 0.0 < value < 1e4:
+        raise argparse.ArgumentTypeError("a length above 0 mm is needed")
+    return value
+
+
 def _demo(commands: "argparse._SubParsersAction[argparse.ArgumentParser]") -> None:
     sub = _command(commands, "demo", "the whole main job on a sample part, with the simulated scanner")
     sub.add_argument("--part", choices=("aerofoil", "flat-plate"), default="aerofoil")
@@ -123,7 +130,27 @@ def _align(commands: "argparse._SubParsersAction[argparse.ArgumentParser]") -> N
     sub.add_argument("--rigid", dest="non_rigid", action="store_false", help="correct BASE only (default)")
     sub.set_defaults(non_rigid=False)
     sub.add_argument("--base", choices=("nominal", "corrected"), help="BASE that was active, for files that cannot say")
+    sub.add_argument(
+        "--with",
+        dest="together",
+        type=Path,
+        nargs="+",
+        action=_Together,
+        default=[],
+        metavar=("DIR SCAN", "SCAN"),
+        help="another plan of the same part and its scans: all scans together determine one correction, for every plan's "
+        "inspection; again for each further plan",
+    )
     _record(sub)
+
+
+class _Together(argparse.Action):
+    """Collects plan folders with their scans; a folder without a scan is wrong usage."""
+
+    def __call__(self, parser, namespace, values, option_string=None) -> None:  # type: ignore[no-untyped-def]
+        if len(values) < 2:
+            parser.error("--with needs the folder of a plan and at least one scan of it")
+        setattr(namespace, self.dest, [*getattr(namespace, self.dest), values])
 
 
 def _record(sub: argparse.ArgumentParser) -> None:
@@ -165,6 +192,10 @@ def _calibrate(commands: "argparse._SubParsersAction[argparse.ArgumentParser]") 
     sub = _command(commands, "calibrate", "tilt loss, couplant or TCP from measurements; prints a patch of setup.json")
     sub.add_argument("kind", choices=("tilt", "couplant", "tcp"))
     sub.add_argument("files", type=Path, nargs="+", metavar="FILE")
+    sub.add_argument(
+        "--target", choices=("plane", "sphere"), default="plane", help="tcp: the fixed target that was scanned"
+    )
+    sub.add_argument("--radius-mm", type=_positive, metavar="R", help="tcp: radius of the sphere; default: to be found")
     sub.add_argument("--setup", type=Path, metavar="setup.json", help="the cell as it is believed to be")
     sub.add_argument("-o", "--output", type=Path, metavar="patch.json", help="write the patch of setup.json here")
 

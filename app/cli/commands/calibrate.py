@@ -5,6 +5,7 @@ import json
 from typing import Any
 
 from alignment.calibrate import calibrate
+from alignment.calibrate.result import Target
 from app.cli.run import DONE, FAILED, say, say_issues
 from app.folder import write_artifacts
 from app.inputs import read_setup
@@ -16,7 +17,10 @@ def run(args: argparse.Namespace) -> tuple[dict[str, Any], int]:
     for path in args.files:
         if not path.is_file():
             raise fail("file-missing", f"there is no file '{path.name}'.", "Check the path.", str(path))
-    found = calibrate(args.kind, args.files, read_setup(args.setup))
+    target: Target = "sphere" if args.radius_mm is not None else args.target
+    if args.kind != "tcp" and target != "plane":
+        raise fail("calibration-target", "A sphere calibrates the TCP only.", "Leave --target and --radius-mm out.")
+    found = calibrate(args.kind, args.files, read_setup(args.setup), target, args.radius_mm)
     content = found.to_json()
     for name, value in content["estimates"].items():
         say(
