@@ -12,6 +12,7 @@ from app.steps.align import Alignment, AlignOptions, run_align
 from app.steps.assess import AssessmentResult, AssessOptions, run_assess
 from app.steps.plan import PlanRequest, run_plan
 from app.steps.simulate import SimulateOptions, run_simulate
+from app.steps.together import PlanScans, run_align_together
 from planner.cad import read_part
 from planner.keypoint import KeyPoint
 from planner.part import Part
@@ -31,9 +32,11 @@ __all__ = [
     "AssessmentResult",
     "Plan",
     "PlanRequest",
+    "PlanScans",
     "Progress",
     "SimulateOptions",
     "align",
+    "align_together",
     "assess",
     "choose_surface",
     "load_plan",
@@ -87,6 +90,11 @@ def simulate(folder: Path, options: SimulateOptions, output: Path, progress: Pro
 def align(folder: Path, scans: Sequence[Path], options: AlignOptions, progress: Progress = silent) -> Alignment:
     """Find the part; return the correction, its report and, unless it failed, the corrected program."""
     return run_align(folder, scans, options, progress)
+
+
+def align_together(items: Sequence[PlanScans], progress: Progress = silent) -> list[Alignment]:
+    """Find one part by the scans of several of its surfaces, each with its plan; return one alignment per plan, in order."""
+    return run_align_together(items, progress)
 
 
 def assess(

@@ -18,6 +18,7 @@ from app.report.record import Record
 from app.report.sections import correction_of, directions_of, inputs_of, keypoints_of, proof_of, verdict_of
 from app.report.sheet import Sheet, sheet_of
 from app.report.shown import number, percent, shown
+from app.report.together import surfaces_of
 from planner.issues import Issue
 from planner.setup import Pose
 
@@ -52,7 +53,7 @@ def alignment_report(plan: Plan, data: ReportData) -> Report:
     content = data.correction
     sheet = sheet_of(plan.surface)
     pages = Pages()
-    pages.add(*verdict_of(content), *correction_of(plan, content), *directions_of(content))
+    pages.add(*verdict_of(content), *correction_of(plan, content), *surfaces_of(content), *directions_of(content))
     states = _states(data)
     figures: dict[str, Any] = {}
     if states:
@@ -141,8 +142,11 @@ def _shape(found: dict[str, Any]) -> str:
 
 
 def _named(plan: Plan, content: dict[str, Any]) -> list[tuple[str, str]]:
+    others = content["inputs"].get("together", ())
     return [
         (f"part: {plan.part.provenance.name}", content["inputs"]["part_sha256"]),
         ("plan", content["inputs"]["plan_sha256"]),
+        *((f"plan aligned together: {o['name']}", o["plan_sha256"]) for o in others),
+        *((f"its scan: {o['name']}", sha256) for o in others for sha256 in o["scan_sha256"]),
         ("EchoBase", content["inputs"]["version"]),
     ]

@@ -10,7 +10,10 @@ from typing import Any, Literal
 
 import numpy as np
 
+from alignment.cloud import PointCloud
+from alignment.correction import Correction
 from alignment.estimate.align import align
+from alignment.scan import Scan, SurfacePoints
 from app.plan import Artifacts, Plan, load_plan
 from app.report.build import Deviation, ReportData, alignment_report
 from app.report.known import ScanFacts
@@ -67,21 +70,52 @@ class Alignment:
     deviation: Deviation
 
 
+@dataclass(frozen=True, eq=False)
+class Prepared:
+    """What an alignment starts from: the plan, the record, the scans as read, and their readings in the nominal base."""
+
+    plan: Plan
+    record: Record
+    read: list[Scan | SurfacePoints]
+    cloud: PointCloud
+
+
+def prepare(folder: Path, scans: Sequence[Path], options: AlignOptions) -> Prepared:
+    """Return plan, record and readings; raises EchoBaseError for unusable input."""
+    plan, record = load_plan(folder), record_of(folder, options.record)
+    read = read_scans(scans)
+    last = options.last_correction
+    corrected = None if last is None else corrected_base(plan.setup.T_world_base, last)
+    return Prepared(plan, record, read, cloud_of(read, plan.setup, options.base, corrected))
+
+
 def run_align(folder: Path, scans: Sequence[Path], options: AlignOptions, progress: Progress) -> Alignment:
     """Return the alignment. A verdict of fail is an answer (no program); raises EchoBaseError for unusable input."""
-    progress(0.02, "reading the plan")
-    plan, record = load_plan(folder), record_of(folder, options.record)
-    progress(0.1, "reading the scan")
-    read = read_scans(scans)
-    setup = plan.setup
-    last = options.last_correction
-    cloud = cloud_of(read, setup, options.base, None if last is None else corrected_base(setup.T_world_base, last))
+    progress(0.02, "reading plan and scan")
+    given = prepare(folder, scans, options)
     progress(0.3, "aligning")
+    plan = given.plan
     rigid = align(
-        cloud, plan.curved, plan.keypoints, setup, plan.inspection, options.method, options.edges, options.non_rigid
-    )
+        given.cloud, plan.curved, plan.keypoints, plan.setup, plan.inspection, options.method, options.edges,
+        options.non_rigid,
+    )  # fmt: skip
+    return complete(given, rigid, options.non_rigid, progress)
+
+
+def complete(
+    given: Prepared,
+    rigid: Correction,
+    non_rigid: bool,
+    progress: Progress,
+    together: Sequence[dict[str, Any]] = (),
+) -> Alignment:
+    """Return the alignment of a rigid correction: the part's shape, the corrected program, the report.
+
+    together: what `inputs` says of the other plans whose scans determined the correction too.
+    """
+    plan, read = given.plan, given.read
     progress(0.6, "looking for a deformation")
-    followed = follow(plan, cloud, rigid, options.non_rigid)
+    followed = follow(plan, given.cloud, rigid, non_rigid)
     found = followed.found
     content = found.to_json()
     content["inputs"] = {
@@ -90,6 +124,8 @@ def run_align(folder: Path, scans: Sequence[Path], options: AlignOptions, progre
         "plan_sha256": plan.sha256,
         "version": version("echobase"),
     }
+    if together:
+        content["inputs"]["together"] = list(together)
     program = None
     if not found.failed:
         progress(0.8, "writing the corrected program")
@@ -102,7 +138,7 @@ def run_align(folder: Path, scans: Sequence[Path], options: AlignOptions, progre
     deviation = _deviation(plan, followed)
     if followed.field_npz is not None:
         artifacts["correction/field.npz"] = followed.field_npz
-    data = _report_data(followed, content, deviation, program, [ScanFacts.of(s) for s in read], record)
+    data = _report_data(followed, content, deviation, program, [ScanFacts.of(s) for s in read], given.record)
     artifacts |= alignment_report(plan, data).files("correction")
     if program:
         artifacts |= program.files

@@ -9,6 +9,7 @@ import numpy as np
 
 from alignment.estimate.predict import predict
 from app.plan import Artifacts, Plan, plan_artifacts
+from app.steps.creases import crease_issues
 from app.steps.programs import export_path, program_name
 from planner.cad import read_part
 from planner.checks import check
@@ -60,13 +61,16 @@ def run_plan(request: PlanRequest, progress: Progress) -> tuple[Plan, Artifacts]
     progress(0.25, "finding the inspection surface")
     up_part = setup.T_base_partnom.inv().directions([0.0, 0.0, 1.0])
     surface = _surface(part, request)
+    creased = crease_issues(surface)
+    if errors_in(creased):
+        raise EchoBaseError(*creased)
     curved = CurvedSurface(surface, footprint_mm(setup.probe))
     progress(0.35, "choosing key points")
     keypoints = snap(curved, request.keypoints) if request.keypoints else suggest(curved, setup)
     refused = kept_out(curved, keypoints, setup)
     if refused:
         raise EchoBaseError(*refused)
-    issues = [*facing_issues(surface, up_part), *clip_issues(surface), *region_issues(curved, setup)]
+    issues = [*facing_issues(surface, up_part), *clip_issues(surface), *creased, *region_issues(curved, setup)]
     issues += [*orientation_issues(curved, setup), *verdicts(curved, keypoints, setup)]
     progress(0.5, "laying the alignment path")
     alignment = alignment_path(curved, keypoints, setup)
