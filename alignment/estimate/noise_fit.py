@@ -52,8 +52,8 @@ def noise_prior(scatter_mm: float, part_size_mm: float, swath_mm: float) -> Nois
     over lengths from millimetres to the size of the part; a part whose form differs from CAD by microns or by much more.
     """
     tilt = np.radians(0.005) * 0.5 * swath_mm
-    centre = [scatter_mm, 0.03, 60.0, 60.0, max(tilt, 1e-4), 0.002, 0.25 * part_size_mm, 0.1, 0.045]
-    below = [0.7, 0.5, 1.6, 1.5, 0.5, 1.0, 0.8, 1.0, 0.6]
+    centre = [scatter_mm, 0.03, 60.0, 30.0, max(tilt, 1e-4), 0.002, 0.25 * part_size_mm, 0.1, 0.045]
+    below = [0.7, 0.5, 1.6, 1.8, 0.5, 1.0, 0.8, 1.0, 0.6]
     above = [0.7, 1.2, 1.6, 1.5, 1.2, 1.5, 0.8, 1.0, 0.6]
     return NoisePrior(np.log(centre), np.array(below), np.array(above))
 

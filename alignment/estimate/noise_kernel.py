@@ -55,8 +55,18 @@ class Kernel:
 
     @cached_property
     def _apart(self) -> Array:
-        """Path between the end of one block and the start of the other (b, b), mm."""
-        a, b = self.rows.block_from_mm, self.rows.block_to_mm
+        """Path between the end of one block and the start of the other (b, b), mm, without the way between the passes.
+
+        How much of its error a robot forgets on that way no one knows: it may stand still, or come back to the same place
+        from the other side. `gap_mm` says it, from the data.
+        """
+        of_pass = np.unique(self.rows.block_pass, return_inverse=True)[1]
+        passes = 1 + int(of_pass.max(initial=-1))
+        start, end = np.full(passes, np.inf), np.full(passes, -np.inf)
+        np.minimum.at(start, of_pass, self.rows.block_from_mm)
+        np.maximum.at(end, of_pass, self.rows.block_to_mm)
+        between = np.r_[0.0, np.cumsum(np.maximum(start[1:] - end[:-1], 0.0))][:passes]
+        a, b = self.rows.block_from_mm - between[of_pass], self.rows.block_to_mm - between[of_pass]
         return np.maximum(np.maximum(a[:, None] - b[None, :], a[None, :] - b[:, None]), 0.0)
 
     @cached_property
