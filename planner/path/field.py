@@ -1,15 +1,20 @@
 """Distance measured on the surface from a guide line: fast marching, polished where the triangles are uneven."""
 
+from collections.abc import Callable
+
+import igl
 import numpy as np
 import potpourri3d
 from numpy.typing import NDArray
-from scipy.sparse import csc_array, csr_array
+from scipy.sparse import csc_array, csc_matrix, csr_array
 from scipy.sparse.linalg import splu
 
 from planner.errors import fail
 from planner.frames import Array
 from planner.part import Faces
 from planner.path.isolines import Ints
+from planner.surface.normals import lengths
+from planner.surface.topology import compact
 
 _GOOD_GRADIENT = 0.01
 _ROUNDS = 2
@@ -47,11 +52,11 @@ def guide_distance(vertices: Array, faces: Faces, height: Array) -> Array:
 
 def _marched(vertices: Array, faces: Faces, source: Ints, start: Array) -> Array:
     """Return fast-marching distances (v,) from vertices with given distances; inf where they do not lead."""
-    used, compact = np.unique(faces, return_inverse=True)
-    number = np.full(len(vertices), -1, dtype=np.int64)
-    number[used] = np.arange(len(used))
-    here = number[source] >= 0
-    solver = potpourri3d.MeshFastMarchingDistanceSolver(vertices[used], compact.reshape(-1, 3))
+    used, number = compact(faces, len(vertices))
+    is_used = np.zeros(len(vertices), dtype=bool)
+    is_used[used] = True
+    here = is_used[source]
+    solver = potpourri3d.MeshFastMarchingDistanceSolver(vertices[used], number[faces])
     curves: list[list[tuple[int, list[float]]]] = [[(int(k), [])] for k in number[source][here]]
     marched = np.asarray(solver.compute_distance(curves, [[float(x)] for x in start[here]], False))
     d = np.full(len(vertices), np.inf)
@@ -80,31 +85,60 @@ def _polished(vertices: Array, faces: Faces, d: Array, fixed: NDArray[np.bool_],
     free = np.flatnonzero(~fixed & used)
     if not len(free):
         return d
-    element = np.einsum("tik,tjk,t->tij", gradient, gradient, area)
-    rows, columns = np.repeat(f, 3, axis=1).ravel(), np.tile(f, (1, 3)).ravel()
-    laplace = csc_array((element.ravel(), (rows, columns)), shape=(n, n))
-    inner = laplace[free][:, free]
-    lift = 1e-9 * float(inner.diagonal().mean())
-    inner = inner + csc_array((np.full(len(free), lift), (np.arange(len(free)),) * 2), shape=inner.shape)
-    solver = splu(inner.tocsc(), permc_spec="MMD_AT_PLUS_A", diag_pivot_thresh=0.0, options={"SymmetricMode": True})
-    gather = csr_array((np.repeat(area, 3), (f.ravel(), np.repeat(np.arange(len(f)), 3))), shape=(n, len(f)))
+    # Off the diagonal one entry per corner of each triangle; rows of a Laplacian sum to nought.
+    p, q = f[:, [1, 2, 0]].ravel(), f[:, [2, 0, 1]].ravel()
+    across = np.stack(
+        [_dot(gradient[:, i], gradient[:, j]) * area for i, j in ((1, 2), (2, 0), (0, 1))], axis=1
+    ).ravel()
+    diagonal = -(np.bincount(p, across, n) + np.bincount(q, across, n))
+    lift = 1e-9 * float(diagonal[free].mean())
+    known = np.where(fixed, d, 0.0)
+    # What the fixed vertices pull at the others with.
+    pull = np.bincount(p, across * known[q], n) + np.bincount(q, across * known[p], n) + diagonal * known
+    number = np.full(n, -1, dtype=np.int64)
+    number[free] = np.arange(len(free))
+    inside = (number[p] >= 0) & (number[q] >= 0)
+    i, j, off = number[p[inside]], number[q[inside]], across[inside]
+    rows, columns = np.concatenate([i, j, np.arange(len(free))]), np.concatenate([j, i, np.arange(len(free))])
+    inner = csc_array((np.concatenate([off, off, diagonal[free] + lift]), (rows, columns)), shape=(len(free),) * 2)
+    solve = _factorised(inner)
+    spread = csr_array((np.ones(f.size), f.ravel(), np.arange(0, f.size + 1, 3)), shape=(len(f), n))
+    gather = (spread.T * area).tocsr()
     corner = vertices[f]
-    normal = np.cross(corner[:, 1] - corner[:, 0], corner[:, 2] - corner[:, 0])
-    normal /= np.linalg.norm(normal, axis=1, keepdims=True)
+    normal = _unit(np.cross(corner[:, 1] - corner[:, 0], corner[:, 2] - corner[:, 0]))
     u = d.copy()
     for _ in range(_ROUNDS):
         x = _unit(np.einsum("tik,ti->tk", gradient, u[f]))
         for _ in range(_AVERAGES):
-            w = gather @ x
-            x = w[f[:, 0]] + w[f[:, 1]] + w[f[:, 2]]
-            x = _unit(x - normal * np.einsum("ij,ij->i", x, normal)[:, None])
-        flow = np.einsum("tik,tk->ti", gradient, x) * area[:, None]
-        right = np.bincount(f.ravel(), flow.ravel(), n) - laplace @ np.where(fixed, u, 0.0)
+            x = spread @ (gather @ x)
+            x = _unit(x - normal * _dot(x, normal)[:, None])
+        right = -pull
+        for k in range(3):
+            right += np.bincount(f[:, k], _dot(gradient[:, k], x) * area, n)
         new = u.copy()
-        new[free] = solver.solve(right[free] + lift * u[free])
+        new[free] = solve(right[free] + lift * u[free])
         u = new
     return u
 
 
+def _factorised(matrix: csc_array) -> Callable[[Array], Array]:
+    """Return the solver of a symmetric positive definite matrix; Cholesky, or LU where rounding leaves it indefinite."""
+    data, n = igl.min_quad_with_fixed_data(), matrix.shape[0]
+    none = np.zeros((0, 1))
+    try:
+        igl.min_quad_with_fixed_precompute(
+            csc_matrix(matrix), np.zeros(0, dtype=np.int64), csc_matrix((0, n)), True, data
+        )
+    except RuntimeError:
+        options = {"SymmetricMode": True}
+        return splu(matrix, permc_spec="MMD_AT_PLUS_A", diag_pivot_thresh=0.0, options=options).solve
+    # It minimises x.Ax / 2 + b.x.
+    return lambda right: np.asarray(igl.min_quad_with_fixed_solve(data, -right[:, None], none, none)[:, 0])
+
+
 def _unit(x: Array) -> Array:
-    return np.asarray(x / np.maximum(np.linalg.norm(x, axis=1, keepdims=True), 1e-12))
+    return np.asarray(x / np.maximum(lengths(x)[:, None], 1e-12))
+
+
+def _dot(a: Array, b: Array) -> Array:
+    return np.asarray(a[:, 0] * b[:, 0] + a[:, 1] * b[:, 1] + a[:, 2] * b[:, 2])

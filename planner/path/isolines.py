@@ -38,6 +38,12 @@ def neighbours(faces: Faces) -> Ints:
 
     Edges with more than two triangles, or with two of opposite orientation, count as boundaries: no walk may cross them.
     """
+    twin = twins(faces)
+    return np.where(twin >= 0, twin // 3, -1)
+
+
+def twins(faces: Faces) -> Ints:
+    """Return for each triangle edge (f, 3) the same edge of the triangle on its other side, as 3 face + edge; -1: boundary."""
     f = faces.astype(np.int64)
     start, end = f.ravel(), np.roll(f, -1, axis=1).ravel()
     n = int(f.max(initial=0)) + 1
@@ -52,7 +58,7 @@ def neighbours(faces: Faces) -> Ints:
     good = start[a] == end[b]
     a, b = a[good], b[good]
     other = np.full(len(key), -1, dtype=np.int64)
-    other[a], other[b] = b // 3, a // 3
+    other[a], other[b] = b, a
     return other.reshape(-1, 3)
 
 

@@ -161,10 +161,8 @@ def _insert(path: ToolPath, points: Array, ups: Array, after: Ints) -> ToolPath:
     links = Transform.from_axes("part", "contact", x, np.cross(ups, x), ups, points - standoff[:, None] * ups)
     n, k = len(path), len(points)
     order = np.argsort(np.concatenate([np.arange(n), after + 0.5]), kind="stable")
-    rotation = type(links.rotation).concatenate([path.Ts_part_contact.rotation, links.rotation])
-    frames = Transform.from_parts(
-        "part", "contact", rotation, np.concatenate([path.Ts_part_contact.xyz_mm, links.xyz_mm])
-    )
+    rigid = type(links.rigid).concatenate([path.Ts_part_contact.rigid, links.rigid])
+    frames = Transform("part", "contact", rigid[order])
     more = {
         "standoff_mm": standoff,
         "heading": path.heading[after],
@@ -174,4 +172,4 @@ def _insert(path: ToolPath, points: Array, ups: Array, after: Ints) -> ToolPath:
         "bary": np.zeros((k, 3)),
     }
     arrays: dict[str, Any] = {name: np.concatenate([getattr(path, name), x])[order] for name, x in more.items()}
-    return replace(path, Ts_part_contact=frames[order], **arrays)
+    return replace(path, Ts_part_contact=frames, **arrays)

@@ -4,6 +4,7 @@ import numpy as np
 from scipy.sparse import coo_array
 from scipy.sparse.csgraph import connected_components
 
+from planner.path.isolines import Ints, twins
 from planner.path.mesh import PathMesh
 
 
@@ -14,20 +15,22 @@ def unglued(mesh: PathMesh) -> PathMesh:
     are sound already come back as they are.
     """
     faces = mesh.faces.astype(np.int64)
-    face, edge = np.nonzero(mesh.other >= 0)
-    there = mesh.other[face, edge]
+    twin = twins(mesh.faces).ravel()
+    edge = np.flatnonzero(twin > np.arange(len(twin)))
+    there = twin[edge]
+    # Both triangles walk a shared edge, in opposite ways: the start of one is the end of the other.
+    c = np.concatenate([_end(there), there])
+    r = np.concatenate([edge, _end(edge)])
     corners = 3 * len(faces)
-    rows, columns = [], []
-    for at in (edge, (edge + 1) % 3):
-        vertex = faces[face, at]
-        match = faces[there] == vertex[:, None]
-        rows.append(3 * face + at)
-        columns.append(3 * there + match.argmax(axis=1))
-    r, c = np.concatenate(rows), np.concatenate(columns)
     graph = coo_array((np.ones(len(r), dtype=np.int8), (r, c)), shape=(corners, corners))
     count, fan = connected_components(graph.tocsr(), directed=False)
-    if count == len(np.unique(faces)):
+    if count == int((np.bincount(faces.ravel()) > 0).sum()):
         return mesh
     vertices = np.zeros((count, 3))
     vertices[fan] = mesh.vertices[faces.ravel()]
     return PathMesh(vertices, fan.reshape(-1, 3).astype(np.int32))
+
+
+def _end(edge: Ints) -> Ints:
+    """Return the corners (n,) in which edges, as 3 face + edge, end."""
+    return np.where(edge % 3 == 2, edge - 2, edge + 1)

@@ -11,7 +11,6 @@ from planner.frames import Array
 from planner.part import Faces
 from planner.path.isolines import Ints, neighbours
 from planner.surface.inspection import InspectionSurface
-from planner.surface.topology import weld, weld_tolerance_mm
 
 
 @dataclass(frozen=True, eq=False)
@@ -30,7 +29,7 @@ class PathMesh:
         known = _KNOWN.get(surface)
         if known is not None:
             return known
-        welded = weld(surface.vertices, weld_tolerance_mm(surface.vertices))
+        welded = surface.welded
         vertices = np.zeros((int(welded.max()) + 1, 3))
         vertices[welded] = surface.vertices
         mesh = _KNOWN[surface] = cls(vertices, welded[surface.faces].astype(np.int32))

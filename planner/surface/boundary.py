@@ -14,8 +14,8 @@ from planner.frames import Array
 from planner.surface.inspection import InspectionSurface
 from planner.surface.loops import successors
 from planner.surface.normals import unit
-from planner.surface.select import welded_faces
-from planner.surface.topology import Index, edges_of, weld, weld_tolerance_mm
+from planner.surface.select import part_edges, welded_faces
+from planner.surface.topology import Index, edges_of
 
 # Faces of the part that continue within this of flat are neither up nor down: the part goes on (a chosen limit, say).
 LEVEL_DEG = 1.0
@@ -105,7 +105,7 @@ def _kinds(surface: InspectionSurface, start: Index, end: Index, face: Index) ->
     """Return the `EdgeKind` of boundary half-edges from welded vertex `start` to `end` of surface row `face` (m,)."""
     part = surface.part
     all_faces = welded_faces(part)
-    edges = edges_of(all_faces)
+    edges = part_edges(part)
     span = int(all_faces.max()) + 1
     keys = edges.vertices[:, 0] * span + edges.vertices[:, 1]
     edge = np.searchsorted(keys, np.minimum(start, end) * span + np.maximum(start, end))
@@ -189,7 +189,7 @@ def distance_to_boundary(surface: InspectionSurface) -> Array:
     straight = edge_distance_mm(curves, surface.vertices)
     if not curves:
         return straight
-    label = weld(surface.vertices, weld_tolerance_mm(surface.vertices))
+    label = surface.welded
     vertices = np.zeros((int(label.max()) + 1, 3))
     vertices[label] = surface.vertices
     near = np.full(len(vertices), np.inf)

@@ -5,6 +5,7 @@ averaged noise of all vertices and none of the bias that a mean of points on a c
 """
 
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 from scipy.sparse import coo_array, csr_array
@@ -33,6 +34,16 @@ class Clusters:
     spread: Array
     normals: Array
     graph: csr_array
+
+    @cached_property
+    def columns(self) -> Array:
+        """The means by coordinate (3, c)."""
+        return np.ascontiguousarray(self.mean.T)
+
+    @cached_property
+    def normal_columns(self) -> Array:
+        """The normals by coordinate (3, c)."""
+        return np.ascontiguousarray(self.normals.T)
 
 
 def cluster(vertices: Array, normals: Array, edges: Index, footprint_mm: float) -> Clusters:

@@ -5,8 +5,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from planner.surface.inspection import InspectionSurface
-from planner.surface.select import dihedral_rad, smooth_regions, welded_faces
-from planner.surface.topology import edges_of
+from planner.surface.select import dihedral_rad, part_edges, smooth_regions
 
 CREASE_DEG = 30.0
 
@@ -26,7 +25,7 @@ def creases_of(surface: InspectionSurface, crease_deg: float = CREASE_DEG) -> Cr
     A crease that runs out within one face, or an edge that a noisy mesh bends, separates nothing and does not count.
     """
     part = surface.part
-    edges = edges_of(welded_faces(part))
+    edges = part_edges(part)
     inside = np.zeros(len(part.faces), dtype=bool)
     inside[surface.part_faces] = True
     label = smooth_regions(part, edges, crease_deg, inside).label

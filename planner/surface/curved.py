@@ -11,9 +11,10 @@ from planner.surface.closest import Foot
 from planner.surface.inspection import InspectionSurface
 from planner.surface.nearest import Triangles
 from planner.surface.normals import unit
-from planner.surface.patch import pn_normals, pn_points
+from planner.surface.patch import CurvedTriangles
 from planner.surface.rays import Scene
-from planner.surface.topology import Edges, edges_of, weld, weld_tolerance_mm
+from planner.surface.solid import solid_of
+from planner.surface.topology import Edges, edges_of
 from planner.surface.vertex_fit import VertexFit, fit_vertices
 
 # Share of the area whose worst triangle gives the angle error.
@@ -46,7 +47,7 @@ class CurvedSurface:
         self.footprint_mm = float(footprint_mm)
         self._faces = np.ascontiguousarray(surface.faces, dtype=np.int64)
         self._vertices = np.ascontiguousarray(surface.vertices)
-        self._welded = weld(self._vertices, weld_tolerance_mm(self._vertices))
+        self._welded = surface.welded
         count = int(self._welded.max()) + 1
         positions = np.zeros((count, 3))
         positions[self._welded] = self._vertices
@@ -59,7 +60,10 @@ class CurvedSurface:
     @cached_property
     def triangles(self) -> Triangles:
         """The triangles, ready to be asked which is nearest."""
-        return Triangles(self._vertices, self._faces)
+        part, own = self.surface.part, len(self._vertices) != len(self.surface.part.vertices)
+        # Where the surface is the whole part, the checks for collisions have the same tree.
+        own |= len(self._faces) != len(part.faces)
+        return Triangles(self._vertices, self._faces, boxes=None if own else lambda: solid_of(part).tree)
 
     @cached_property
     def _edges(self) -> Edges:
@@ -73,22 +77,22 @@ class CurvedSurface:
         on[edges.vertices[edges.is_boundary].ravel()] = True
         return on
 
+    @cached_property
+    def _patches(self) -> CurvedTriangles:
+        return CurvedTriangles(self.vertex_fit.points, self.vertex_fit.normals)
+
     def evaluate(self, face: NDArray, bary: Array) -> tuple[Array, Array]:
         """Return points (n, 3) and unit outward normals (n, 3) at barycentrics of faces."""
-        corner = self._faces[face]
-        points, normals = self.vertex_fit.points[corner], self.vertex_fit.normals[corner]
-        return pn_points(points, normals, bary), self._blend(points, normals, bary)
+        points, normals = self._patches.points_and_normals(self._faces[face], bary)
+        return points, normals if self.vertex_fit.exact else self._blended(face, bary)
 
     def normals(self, face: NDArray, bary: Array) -> Array:
         """Return unit outward normals (n, 3)."""
-        corner = self._faces[face]
-        return self._blend(self.vertex_fit.points[corner], self.vertex_fit.normals[corner], bary)
+        return self._patches.normals(self._faces[face], bary) if self.vertex_fit.exact else self._blended(face, bary)
 
-    def _blend(self, corners: Array, normals: Array, bary: Array) -> Array:
+    def _blended(self, face: NDArray, bary: Array) -> Array:
         """Return normals inside triangles; between vertices that scatter, what these say about slopes is only noise."""
-        if self.vertex_fit.exact:
-            return pn_normals(corners, normals, bary)
-        return unit(np.einsum("nk,nkj->nj", bary, normals))
+        return unit(np.einsum("nk,nkj->nj", bary, self.vertex_fit.normals[self._faces[face]]))
 
     def shape_operator(self, face: NDArray, bary: Array) -> Array:
         """Return symmetric W (n, 3, 3), 1/mm, with dn = W dp for steps along the surface; a sphere has +1/R."""

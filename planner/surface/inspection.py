@@ -8,6 +8,7 @@ from numpy.typing import NDArray
 
 from planner.frames import Array
 from planner.part import Faces, Part
+from planner.surface.topology import compact, weld, weld_tolerance_mm
 
 
 @dataclass(frozen=True, eq=False)
@@ -22,8 +23,14 @@ class InspectionSurface:
 
     @cached_property
     def _compact(self) -> tuple[Array, Faces]:
-        used, inverse = np.unique(self.part.faces[self.part_faces], return_inverse=True)
-        return self.part.vertices[used], inverse.reshape(-1, 3).astype(np.int32)
+        faces = self.part.faces[self.part_faces]
+        used, number = compact(faces, len(self.part.vertices))
+        return self.part.vertices[used], number[faces].astype(np.int32)
+
+    @cached_property
+    def welded(self) -> NDArray[np.int64]:
+        """For every vertex (v,) the number of its welded vertex: those that coincide within rounding are one."""
+        return weld(self.vertices, weld_tolerance_mm(self.vertices))
 
     @property
     def vertices(self) -> Array:

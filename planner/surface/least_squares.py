@@ -86,9 +86,12 @@ def _solve(phi: Array, h: Array, weight: Array, starts: NDArray[np.int64], ridge
     return np.asarray(np.linalg.solve(matrix, right[..., None])[..., 0])
 
 
-def residual_slope(phi: Array, h: Array, rho: Array, coefficients: Array) -> Array:
-    """Return residual over distance (p,), rad, of coefficients given per pair (p, terms); 0 at the node itself."""
-    residual = h - np.einsum("tn,nt->n", phi, coefficients)
+def residual_slope(phi: Array, h: Array, rho: Array, coefficients: Array, sizes: NDArray[np.int64]) -> Array:
+    """Return residual over distance (p,), rad, of coefficients (n, terms) of segments of `sizes` (n,); 0 at the node."""
+    residual = h.copy()
+    for feature, c in zip(phi, np.ascontiguousarray(coefficients.T), strict=False):
+        if c.any():
+            residual -= feature * c.repeat(sizes)
     return np.asarray(np.divide(residual, rho, out=np.zeros_like(h), where=rho > 0))
 
 
@@ -112,14 +115,13 @@ def one_sided(
     `slope_precision`.
     """
     starts = np.r_[0, np.cumsum(sizes)[:-1]]
-    row = np.repeat(np.arange(len(sizes)), sizes)
     best = two_sided.copy()
-    slope = residual_slope(phi, h, rho, two_sided[row])
+    slope = residual_slope(phi, h, rho, two_sided, sizes)
     bound = BETTER * np.sqrt(np.add.reduceat(slope * slope, starts) / np.maximum(sizes - 1, 1))
     flat = np.hypot(phi[1], phi[2])
     cosine = np.divide(phi[1], flat, out=np.zeros_like(flat), where=flat > 0)
     sine = np.divide(phi[2], flat, out=np.zeros_like(flat), where=flat > 0)
-    sides = [(_agreeing(phi[:6], h, weight, rho, adjacent, starts, row), 5)]
+    sides = [(_agreeing(phi[:6], h, weight, rho, adjacent, starts, sizes), 5)]
     angles = np.arange(DIRECTIONS) * (2.0 * np.pi / DIRECTIONS)
     sides += [(cosine * np.cos(angle) + sine * np.sin(angle) > -0.05, 8) for angle in angles]
     for side, least in sides:
@@ -133,7 +135,7 @@ def one_sided(
         found[:, :6] = solve_segments(
             phi[:6], h, np.where(chosen, weight, 0.0), starts, through=True, slope_precision=slopes
         )
-        slope = np.where(chosen, residual_slope(phi, h, rho, found[row]), 0.0)
+        slope = np.where(chosen, residual_slope(phi, h, rho, found, sizes), 0.0)
         rms = np.sqrt(np.add.reduceat(slope * slope, starts) / np.maximum(count - 5, 1))
         better = (rms < bound) & (spread > LEAST_SPREAD) & (count >= least)
         best[better], bound[better] = found[better], rms[better]
@@ -147,12 +149,12 @@ def _agreeing(
     rho: Array,
     adjacent: NDArray[np.bool_],
     starts: NDArray[np.int64],
-    row: NDArray[np.int64],
+    sizes: NDArray[np.int64],
 ) -> NDArray[np.bool_]:
     """Return which neighbours (p,) lie on one quadric with the nearest ring: reweighted least squares, Cauchy weights."""
     trust = np.where(adjacent, 1.0, 1e-3)
     slope = np.zeros_like(h)
     for scale in (AGREE_RAD, AGREE_RAD, AGREE_RAD / 2.0, AGREE_RAD / 4.0):
-        slope = residual_slope(phi, h, rho, solve_segments(phi, h, weight * trust, starts)[row])
+        slope = residual_slope(phi, h, rho, solve_segments(phi, h, weight * trust, starts), sizes)
         trust = 1.0 / (1.0 + (slope / scale) ** 2)
     return np.asarray(np.abs(slope) < AGREE_RAD)

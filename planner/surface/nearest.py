@@ -7,7 +7,7 @@ longest edge, is how far a point of a triangle can be from its nearest corner. W
 triangles around the vertices within sqrt(d^2 + rho^2) hold the nearest one.
 """
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from functools import cached_property
 
@@ -44,8 +44,15 @@ class Nearest:
 class Triangles:
     """vertices (v, 3), mm, and faces (f, 3), ready to be asked for the triangle nearest to a point."""
 
-    def __init__(self, vertices: Array, faces: NDArray[np.int64], fine_faces: int = FINE_FACES) -> None:
-        self.vertices, self.faces = vertices, faces
+    def __init__(
+        self,
+        vertices: Array,
+        faces: NDArray[np.int64],
+        fine_faces: int = FINE_FACES,
+        boxes: Callable[[], igl.AABB] | None = None,
+    ) -> None:
+        """boxes: gives a tree over the same triangles that somebody else needs as well."""
+        self.vertices, self.faces, self._elsewhere = vertices, faces, boxes
         self.is_fine = len(faces) >= fine_faces
 
     def nearest(self, query: Array) -> Nearest:
@@ -131,6 +138,8 @@ class Triangles:
 
     @cached_property
     def _boxes(self) -> igl.AABB:
+        if self._elsewhere is not None:
+            return self._elsewhere()
         tree = igl.AABB()
         tree.init(self.vertices, self.faces)
         return tree

@@ -5,6 +5,7 @@ footprint and its vertices are exact). Unlike an average of facet normals, its s
 or a hole, because the curvature is estimated along with it.
 """
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -79,6 +80,8 @@ def fit_nodes(clusters: Clusters, rings: csr_array, nodes: NDArray[np.int64], te
 def _pairs(rings: csr_array, nodes: NDArray[np.int64]) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
     sizes = np.diff(rings.indptr)[nodes]
     starts = np.r_[0, np.cumsum(sizes)[:-1]]
+    if len(nodes) and nodes[-1] - nodes[0] == len(nodes) - 1:
+        return rings.indices[rings.indptr[nodes[0]] : rings.indptr[nodes[-1] + 1]].astype(np.int64), starts
     within = np.arange(int(sizes.sum())) - np.repeat(starts, sizes)
     return np.asarray(rings.indices[np.repeat(rings.indptr[nodes], sizes) + within], dtype=np.int64), starts
 
@@ -86,18 +89,18 @@ def _pairs(rings: csr_array, nodes: NDArray[np.int64]) -> tuple[NDArray[np.int64
 def _fit(clusters: Clusters, rings: csr_array, nodes: NDArray[np.int64], terms: int, exact: bool) -> LocalFit:
     other, starts = _pairs(rings, nodes)
     sizes = np.diff(np.r_[starts, len(other)])
-    row = np.repeat(np.arange(len(nodes)), sizes)
     normal = clusters.normals[nodes]
     first, second = tangent_frames(normal)
-    d = clusters.mean[other] - np.repeat(clusters.mean[nodes], sizes, axis=0)
-    f, s, m = (np.repeat(axis, sizes, axis=0) for axis in (first, second, normal))
-    u, v, h = (np.einsum("ij,ij->i", d, axis) for axis in (f, s, m))
+    # By coordinate: rows of three take numpy several times as long.
+    d = [x[other] - x[nodes].repeat(sizes) for x in clusters.columns]
+    f, s, m = ([x.repeat(sizes) for x in np.ascontiguousarray(axis.T)] for axis in (first, second, normal))
+    u, v, h = (_dot(d, axis) for axis in (f, s, m))
     distance = np.sqrt(u * u + v * v + h * h)
     scale = np.maximum.reduceat(distance, starts)
     scale[scale == 0] = 1.0
-    k = np.repeat(scale, sizes)
+    k = scale.repeat(sizes)
     rho = distance / k
-    turn2 = 2.0 - 2.0 * np.einsum("ij,ij->i", clusters.normals[other], m)
+    turn2 = 2.0 - 2.0 * _dot([x[other] for x in clusters.normal_columns], m)
     phi = monomials(u / k, v / k, terms)
     if exact:
         nearest = np.repeat(np.minimum.reduceat(np.where(rho > 0, rho, 1.0), starts), sizes)
@@ -114,20 +117,21 @@ def _fit(clusters: Clusters, rings: csr_array, nodes: NDArray[np.int64], terms: 
     h /= k
     sure = None
     if exact and terms == 10:
-        turned = clusters.normals[other] - m
-        tu, tv = (np.einsum("ij,ij->i", turned, axis) for axis in (f, s))
+        turned = [x[other] - y for x, y in zip(clusters.normal_columns, m, strict=True)]
+        tu, tv = _dot(turned, f), _dot(turned, s)
         sure = slope_precision((tu, tv), (phi[1], phi[2]), turn2, starts)
         # Only slivers leave a direction without near neighbours.
         sure *= np.minimum(SLIVER / nearest[starts], 1.0)[:, None, None] ** 6
         sure *= np.minimum(LONG / _roundness(phi[1], phi[2], starts), 1.0)[:, None, None] ** 2
     coefficients = solve_segments(phi, h, weight, starts, through=exact, slope_precision=sure)
-    slope = residual_slope(phi, h, rho, coefficients[row])
+    slope = residual_slope(phi, h, rho, coefficients, sizes)
     slope_rms = np.sqrt(np.add.reduceat(slope * slope, starts) / np.maximum(sizes - 1, 1))
     if exact:
         jumps = np.flatnonzero(slope_rms > KINK_RAD)
         if len(jumps):
             pair = np.concatenate([np.arange(starts[j], starts[j] + sizes[j]) for j in jumps])
-            adjacent = np.asarray(clusters.graph[nodes[row[pair]], other[pair]]).reshape(-1) > 0
+            node = np.repeat(nodes[jumps], sizes[jumps])
+            adjacent = np.asarray(clusters.graph[node, other[pair]]).reshape(-1) > 0
             coefficients[jumps] = one_sided(
                 phi[:, pair],
                 h[pair],
@@ -151,11 +155,16 @@ def _roundness(u: Array, v: Array, starts: NDArray[np.int64]) -> Array:
     return np.asarray(np.maximum((middle - half) / np.maximum(middle + half, 1e-30), 1e-9))
 
 
-def _quadratic(tensor: Array, a: Array, b: Array) -> Array:
+def _quadratic(tensor: Array, a: Sequence[Array], b: Sequence[Array]) -> Array:
     """Return a . S . b of symmetric tensors (n, 6) in the order xx, yy, zz, xy, xz, yz."""
     xx, yy, zz, xy, xz, yz = tensor.T
     return np.asarray(
-        a[:, 0] * (xx * b[:, 0] + xy * b[:, 1] + xz * b[:, 2])
-        + a[:, 1] * (xy * b[:, 0] + yy * b[:, 1] + yz * b[:, 2])
-        + a[:, 2] * (xz * b[:, 0] + yz * b[:, 1] + zz * b[:, 2])
+        a[0] * (xx * b[0] + xy * b[1] + xz * b[2])
+        + a[1] * (xy * b[0] + yy * b[1] + yz * b[2])
+        + a[2] * (xz * b[0] + yz * b[1] + zz * b[2])
     )
+
+
+def _dot(a: Sequence[Array], b: Sequence[Array]) -> Array:
+    """Return the products (n,) of vectors given by coordinate."""
+    return np.asarray(a[0] * b[0] + a[1] * b[1] + a[2] * b[2])

@@ -15,6 +15,7 @@ from planner.part import Part
 from planner.shapes import Box
 from planner.surface.facing import facing
 from planner.surface.inspection import InspectionSurface
+from planner.surface.normals import lengths
 from planner.surface.topology import Edges, Index, edges_of, weld, weld_tolerance_mm
 
 SEED_REACH_MM = 2.0
@@ -57,7 +58,7 @@ def inspection_surface(
     seeds = None if seeds_part is None else np.asarray(seeds_part, dtype=np.float64).reshape(-1, 3)
     up = np.asarray(UP if up_part is None else up_part, dtype=np.float64).reshape(3)
     up = up / np.linalg.norm(up)
-    edges = edges_of(welded_faces(part))
+    edges = part_edges(part)
     start = _seed_faces(part, seeds) if seeds is not None and len(seeds) else None
     allowed = _facing(part, up if start is None else part.face_normals[start].mean(axis=0), max_turn_deg)
     regions = smooth_regions(part, edges, crease_deg, allowed)
@@ -79,11 +80,20 @@ def welded_faces(part: Part) -> Index:
     return known
 
 
+def part_edges(part: Part) -> Edges:
+    """Return the edges of the welded faces of a part; kept as long as it lives."""
+    known = _EDGES.get(part)
+    if known is None:
+        known = _EDGES[part] = edges_of(welded_faces(part))
+    return known
+
+
 _WELDED: "WeakKeyDictionary[Part, Index]" = WeakKeyDictionary()
+_EDGES: "WeakKeyDictionary[Part, Edges]" = WeakKeyDictionary()
 
 
 def dihedral_rad(part: Part, edges: Edges) -> Array:
-    """Return the angle between the two faces at every edge (e,), rad, 0 for coplanar; pi where there are not two.
+    """Return the angle between the two faces at every edge (e,) of the part, rad, 0 for coplanar; pi where there are not two.
 
     Faces that walk their edge the same way are wound against each other: the angle is then taken with one of them turned.
     A sliver has no normal of its own: it counts as part of the face across its longest edge.
@@ -92,7 +102,7 @@ def dihedral_rad(part: Part, edges: Edges) -> Array:
     pair = np.flatnonzero(edges.uses == 2)
     normals = _normals_without_slivers(part, edges)
     a, b = normals[edges.first[pair]], normals[edges.second[pair]]
-    sine, cosine = np.linalg.norm(np.cross(a, b), axis=1), np.einsum("ij,ij->i", a, b)
+    sine, cosine = lengths(np.cross(a, b)), np.einsum("ij,ij->i", a, b)
     angle[pair] = np.arctan2(sine, np.where(same_winding(edges)[pair], cosine, -cosine))
     return angle
 
@@ -100,9 +110,9 @@ def dihedral_rad(part: Part, edges: Edges) -> Array:
 def _normals_without_slivers(part: Part, edges: Edges) -> Array:
     """Return face normals (f, 3); those of triangles thinner than rounding are taken from the face across the longest edge."""
     ends = part.vertices[part.faces]
-    lengths = np.stack([np.linalg.norm(ends[:, (k + 2) % 3] - ends[:, (k + 1) % 3], axis=1) for k in range(3)], axis=1)
-    longest = lengths.argmax(axis=1)
-    height = 2.0 * part.face_areas_mm2 / np.maximum(lengths.max(axis=1), 1e-30)
+    a, b, c = (lengths(ends[:, (k + 2) % 3] - ends[:, (k + 1) % 3]) for k in range(3))
+    longest = np.where(c > np.maximum(a, b), 2, np.where(b > a, 1, 0))
+    height = 2.0 * part.face_areas_mm2 / np.maximum(np.maximum(np.maximum(a, b), c), 1e-30)
     thin = np.flatnonzero(height < 4.0 * weld_tolerance_mm(part.vertices))
     if not len(thin):
         return part.face_normals

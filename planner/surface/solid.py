@@ -21,7 +21,8 @@ class Solid:
         self._part_normals = part.face_normals
 
     @cached_property
-    def _tree(self) -> Any:
+    def tree(self) -> Any:
+        """The triangles in a tree of boxes."""
         tree = igl.AABB()
         tree.init(self.vertices, self.faces)
         return tree
@@ -31,7 +32,7 @@ class Solid:
         points = np.ascontiguousarray(points_part, dtype=np.float64).reshape(-1, 3)
         if len(points) == 0:
             return np.zeros(0), np.zeros(0, dtype=np.int64), np.zeros((0, 3))
-        squared, face, at = self._tree.squared_distance(self.vertices, self.faces, points)
+        squared, face, at = self.tree.squared_distance(self.vertices, self.faces, points)
         return np.sqrt(np.atleast_1d(squared)), np.atleast_1d(face), np.atleast_2d(at)
 
     def distance_mm(self, points_part: Array) -> Array:

@@ -11,6 +11,7 @@ from scipy.spatial import cKDTree
 from planner.frames import Array
 
 Index = NDArray[np.int64]
+_ASKEW = np.array([1.0, np.sqrt(2.0), np.pi]) / np.sqrt(3.0 + np.pi**2)
 
 
 @dataclass(frozen=True, eq=False)
@@ -61,12 +62,26 @@ def edges_of(faces: Index) -> Edges:
     )
 
 
+def compact(faces: NDArray[np.integer], count: int) -> tuple[Index, Index]:
+    """Return which of `count` vertices faces (f, 3) use (u,), ascending, and the number among these of every vertex."""
+    mark = np.zeros(count, dtype=bool)
+    mark[faces.ravel()] = True
+    return np.flatnonzero(mark), np.cumsum(mark) - 1
+
+
 def weld(vertices: Array, tolerance_mm: float) -> Index:
     """Return for every vertex (v, 3) the number of its welded vertex (v,): those nearer than the tolerance are one."""
-    pairs = cKDTree(vertices).query_pairs(tolerance_mm, output_type="ndarray")
-    if not len(pairs):
-        return np.arange(len(vertices))
     n = len(vertices)
+    # Neighbours within the tolerance are so along any direction too; one that no grid lies square to leaves few to look at.
+    along = vertices @ _ASKEW
+    order = np.argsort(along)
+    close = np.diff(along[order]) <= tolerance_mm
+    some = np.sort(order[np.r_[close, False] | np.r_[False, close]])
+    if not len(some):
+        return np.arange(n)
+    pairs = some[cKDTree(vertices[some]).query_pairs(tolerance_mm, output_type="ndarray")]
+    if not len(pairs):
+        return np.arange(n)
     graph = coo_array((np.ones(len(pairs), dtype=np.int8), (pairs[:, 0], pairs[:, 1])), shape=(n, n))
     return np.asarray(connected_components(graph, directed=False)[1], dtype=np.int64)
 

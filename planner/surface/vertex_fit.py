@@ -9,7 +9,7 @@ from scipy.sparse import csr_array, eye_array
 from planner.frames import Array
 from planner.surface.clusters import Clusters, cluster
 from planner.surface.flats import find_flats
-from planner.surface.normals import angle_weighted_normals, lengths, unit
+from planner.surface.normals import angle_weighted_normals
 from planner.surface.quadric import LocalFit, fit_nodes, monomials, two_rings
 from planner.surface.topology import Index, edges_of, vertex_graph
 
@@ -20,6 +20,8 @@ NOISE_RAD = 0.004
 NOISE_SAMPLE = 3000
 # Neighbours that a cubic wants.
 ENOUGH = 16
+# Vertices worked on at a time: what stays in a processor's cache.
+SLICE = 16_384
 
 
 @dataclass(frozen=True, eq=False)
@@ -83,7 +85,7 @@ def _through(points: Clusters, coarse: NDArray[np.bool_]) -> VertexFit:
             near = (points.graph + eye_array(n, dtype=np.int8, format="csr")).tocsr()
             around = _as_rows((rings[nodes] @ near).tocsr(), nodes, n)
         fit = fit_nodes(points, around, nodes, terms, exact=True)
-        _, normals[nodes], shape[nodes] = evaluate_fit(fit, np.arange(len(nodes)), points.mean[nodes])
+        _, normals[nodes], shape[nodes] = at_nodes(fit, points.mean[nodes])
     return VertexFit(points.mean, normals, shape, exact=True)
 
 
@@ -103,10 +105,15 @@ def _as_rows(rows: csr_array, nodes: NDArray[np.int64], n: int) -> csr_array:
 
 
 def _mean_link_mm(graph: csr_array, mean: Array) -> Array:
-    row = np.repeat(np.arange(graph.shape[0]), np.diff(graph.indptr))
-    length = lengths(mean[row] - mean[graph.indices])
-    n = np.maximum(np.bincount(row, minlength=graph.shape[0]), 1)
-    return np.asarray(np.bincount(row, length, graph.shape[0]) / n)
+    count = np.diff(graph.indptr)
+    total = np.zeros(graph.shape[0])
+    for start in range(0, graph.shape[0], SLICE):
+        rows = slice(start, min(start + SLICE, graph.shape[0]))
+        other = graph.indices[graph.indptr[rows.start] : graph.indptr[rows.stop]]
+        row = np.repeat(np.arange(rows.stop - rows.start), count[rows])
+        step2 = sum(((x[other] - x[rows][row]) ** 2 for x in mean.T), np.zeros(len(other)))
+        total[rows] = np.bincount(row, np.sqrt(step2), rows.stop - rows.start)
+    return np.asarray(total / np.maximum(count, 1))
 
 
 def evaluate_fit(fit: LocalFit, row: NDArray, points: Array) -> tuple[Array, Array, Array]:
@@ -122,15 +129,39 @@ def evaluate_fit(fit: LocalFit, row: NDArray, points: Array) -> tuple[Array, Arr
     huv = c[4] + 2 * c[7] * u + 2 * c[8] * v
     hvv = 2 * c[5] + 2 * c[8] * u + 6 * c[9] * v
     foot = fit.origin[row] + u[:, None] * first + v[:, None] * second + h[:, None] * normal
-    outward = unit(normal - hu[:, None] * first - hv[:, None] * second)
-    # Weingarten: dn = -G^-1 II in the basis p_u, p_v; E G^-1 is the dual basis, so W = -(dual) II (dual)^T.
-    pu, pv = first + hu[:, None] * normal, second + hv[:, None] * normal
+    return foot, *_bent((first, second, normal), (hu, hv), (huu, huv, hvv))
+
+
+def at_nodes(fit: LocalFit, points: Array) -> tuple[Array, Array, Array]:
+    """Return the same at the polynomials' own nodes (n,), through which they go."""
+    n = len(points)
+    normals, shape = np.zeros((n, 3)), np.zeros((n, 3, 3))
+    for start in range(0, n, SLICE):
+        rows = slice(start, start + SLICE)
+        c = fit.coefficients[rows].T
+        axes = (fit.first[rows], fit.second[rows], fit.normal[rows])
+        normals[rows], shape[rows] = _bent(axes, (c[1], c[2]), (2 * c[3], c[4], 2 * c[5]))
+    return points, normals, shape
+
+
+def _bent(
+    axes: tuple[Array, Array, Array], slopes: tuple[Array, Array], second: tuple[Array, Array, Array]
+) -> tuple[Array, Array]:
+    """Return normals (n, 3) and W (n, 3, 3) of a height over frames, from its slopes and second derivatives (n,) each.
+
+    Weingarten: dn = -G^-1 II in the basis p_u, p_v; E G^-1 is the dual basis, so W = -(dual) II (dual)^T.
+    """
+    (first, other, normal), (hu, hv), (huu, huv, hvv) = (np.ascontiguousarray(a.T) for a in axes), slopes, second
     e, f, g = 1 + hu * hu, hu * hv, 1 + hv * hv
-    det = e * g - f * f
-    du = (g[:, None] * pu - f[:, None] * pv) / det[:, None]
-    dv = (e[:, None] * pv - f[:, None] * pu) / det[:, None]
-    root = np.sqrt(1 + hu * hu + hv * hv)
-    cross = np.einsum("ni,nj->nij", du, dv)
-    w = huu[:, None, None] * np.einsum("ni,nj->nij", du, du) + hvv[:, None, None] * np.einsum("ni,nj->nij", dv, dv)
-    w += huv[:, None, None] * (cross + cross.transpose(0, 2, 1))
-    return foot, outward, -w / root[:, None, None]
+    det = e * g - f * f  # is 1 + hu^2 + hv^2
+    root = np.sqrt(det)
+    outward = (normal - hu * first - hv * other) / root
+    pu, pv = first + hu * normal, other + hv * normal
+    du, dv = (g * pu - f * pv) / det, (e * pv - f * pu) / det
+    # II (dual)^T, halves of a symmetric product.
+    ru, rv = -(huu * du + huv * dv) / root, -(huv * du + hvv * dv) / root
+    shape = np.zeros((len(hu), 3, 3))
+    for i in range(3):
+        for j in range(i, 3):
+            shape[:, i, j] = shape[:, j, i] = du[i] * ru[j] + dv[i] * rv[j]
+    return np.ascontiguousarray(outward.T), shape
