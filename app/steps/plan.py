@@ -15,6 +15,7 @@ from planner.cad import read_part
 from planner.checks import check
 from planner.checks.orientation import orientation_issues
 from planner.checks.regions import region_issues
+from planner.checks.tessellation import tessellation_issues
 from planner.errors import EchoBaseError
 from planner.issues import Issue, errors_in
 from planner.keypoint import KeyPoint
@@ -71,7 +72,8 @@ def run_plan(request: PlanRequest, progress: Progress) -> tuple[Plan, Artifacts]
     if refused:
         raise EchoBaseError(*refused)
     issues = [*facing_issues(surface, up_part), *clip_issues(surface), *creased, *region_issues(curved, setup)]
-    issues += [*orientation_issues(curved, setup), *verdicts(curved, keypoints, setup)]
+    issues += [*tessellation_issues(curved, setup), *orientation_issues(curved, setup)]
+    issues += verdicts(curved, keypoints, setup)
     progress(0.5, "laying the alignment path")
     alignment = alignment_path(curved, keypoints, setup)
     progress(0.6, "laying the inspection raster")

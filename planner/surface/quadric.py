@@ -100,7 +100,7 @@ def _fit(clusters: Clusters, rings: csr_array, nodes: NDArray[np.int64], terms: 
     scale[scale == 0] = 1.0
     k = scale.repeat(sizes)
     rho = distance / k
-    turn2 = 2.0 - 2.0 * _dot([x[other] for x in clusters.normal_columns], m)
+    turn2 = np.maximum(2.0 - 2.0 * _dot([x[other] for x in clusters.normal_columns], m), 0.0)
     phi = monomials(u / k, v / k, terms)
     if exact:
         nearest = np.repeat(np.minimum.reduceat(np.where(rho > 0, rho, 1.0), starts), sizes)
