@@ -10,6 +10,7 @@ from pathlib import Path
 from app.plan import Artifacts, Plan, load_plan, plan_artifacts
 from app.steps.align import Alignment, AlignOptions, run_align
 from app.steps.assess import AssessmentResult, AssessOptions, run_assess
+from app.steps.batch import BatchResult, run_batch
 from app.steps.plan import PlanRequest, run_plan
 from app.steps.simulate import SimulateOptions, run_simulate
 from app.steps.together import PlanScans, run_align_together
@@ -30,6 +31,7 @@ __all__ = [
     "Artifacts",
     "AssessOptions",
     "AssessmentResult",
+    "BatchResult",
     "Plan",
     "PlanRequest",
     "PlanScans",
@@ -38,6 +40,7 @@ __all__ = [
     "align",
     "align_together",
     "assess",
+    "batch",
     "choose_surface",
     "load_plan",
     "open_part",
@@ -102,3 +105,8 @@ def assess(
 ) -> AssessmentResult:
     """Judge an inspection scan, in one file or more, against the plan, and against the one from before."""
     return run_assess(folder, scans, options, progress)
+
+
+def batch(folder: Path, parts: Sequence[Path], options: AlignOptions, progress: Progress = silent) -> BatchResult:
+    """Compare serial parts on one fixture: each a correction.json, a folder with one, or a scan that is aligned now."""
+    return run_batch(folder, parts, options, progress)

@@ -21,7 +21,7 @@ def build_parser() -> argparse.ArgumentParser:
     )
     parser.add_argument("--version", action="store_true", help="print the version and exit")
     commands = parser.add_subparsers(dest="command", metavar="COMMAND")
-    for add in (_demo, _plan, _simulate, _align, _assess, _check, _calibrate, _robot, _reproduce, _serve):
+    for add in (_demo, _plan, _simulate, _align, _batch, _assess, _check, _calibrate, _robot, _reproduce, _serve):
         add(commands)
     return parser
 
@@ -121,15 +121,7 @@ def _align(commands: "argparse._SubParsersAction[argparse.ArgumentParser]") -> N
     sub.add_argument("directory", type=Path, metavar="DIR", help="folder written by `echobase plan`")
     sub.add_argument("scans", type=Path, nargs="+", metavar="SCAN")
     sub.add_argument("--method", choices=("map", "keypoints"), default="map")
-    sub.add_argument(
-        "--edges", action=argparse.BooleanOptionalAction, default=None, help="default: wherever the scan crosses them"
-    )
-    sub.add_argument(
-        "--non-rigid", dest="non_rigid", action="store_true", help="adapt the poses to a part that sprang back"
-    )
-    sub.add_argument("--rigid", dest="non_rigid", action="store_false", help="correct BASE only (default)")
-    sub.set_defaults(non_rigid=False)
-    sub.add_argument("--base", choices=("nominal", "corrected"), help="BASE that was active, for files that cannot say")
+    _how_aligned(sub)
     sub.add_argument(
         "--with",
         dest="together",
@@ -151,6 +143,31 @@ class _Together(argparse.Action):
         if len(values) < 2:
             parser.error("--with needs the folder of a plan and at least one scan of it")
         setattr(namespace, self.dest, [*getattr(namespace, self.dest), values])
+
+
+def _how_aligned(sub: argparse.ArgumentParser) -> None:
+    sub.add_argument(
+        "--edges", action=argparse.BooleanOptionalAction, default=None, help="default: wherever the scan crosses them"
+    )
+    sub.add_argument(
+        "--non-rigid", dest="non_rigid", action="store_true", help="adapt the poses to a part that sprang back"
+    )
+    sub.add_argument("--rigid", dest="non_rigid", action="store_false", help="correct BASE only (default)")
+    sub.set_defaults(non_rigid=False)
+    sub.add_argument("--base", choices=("nominal", "corrected"), help="BASE that was active, for files that cannot say")
+
+
+def _batch(commands: "argparse._SubParsersAction[argparse.ArgumentParser]") -> None:
+    sub = _command(commands, "batch", "compare serial parts on one fixture: what is common, what is each part's own")
+    sub.add_argument("directory", type=Path, metavar="DIR", help="folder written by `echobase plan`")
+    sub.add_argument(
+        "parts",
+        type=Path,
+        nargs="+",
+        metavar="PART",
+        help="one part each: correction.json, a folder that holds it, or a scan that is aligned now",
+    )
+    _how_aligned(sub)
 
 
 def _record(sub: argparse.ArgumentParser) -> None:
