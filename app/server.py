@@ -29,6 +29,7 @@ from app.api import (
     samples,
     scan_routes,
     state_routes,
+    together_routes,
     work,
 )
 from app.api.context import Context
@@ -95,6 +96,7 @@ def create_app(settings: ServerSettings) -> FastAPI:
         report_routes,
         result_routes,
         state_routes,
+        together_routes,
         job_routes,
     ):
         app.include_router(module.router, prefix=PREFIX)

@@ -104,6 +104,14 @@ def _once(numbers: list[int] | None) -> list[int] | None:
     return numbers
 
 
+class OtherPlan(Body):
+    """Another project of the same part whose scans are aligned together with this one's."""
+
+    project: str = Field(max_length=40, examples=["5f1c0a9b2d3e4f5a6b7c"])
+    scans: Annotated[list[Which] | None, AfterValidator(_once)] = Field(None, min_length=1, max_length=64)
+    """Numbers of its scans; null: the newest one of its alignment path."""
+
+
 class AlignmentRequest(Body):
     """How to align."""
 
@@ -115,6 +123,9 @@ class AlignmentRequest(Body):
     non_rigid: bool = False
     base: Literal["nominal", "corrected"] | None = None
     """BASE that was active, for files that cannot say; null: as said with the upload."""
+    together: list[OtherPlan] = Field([], max_length=15)
+    """Other projects of this part, each with its own surface and scans: all scans together determine one correction, which
+    every one of the projects gets as its newest alignment."""
 
 
 class Acceptance(Body):

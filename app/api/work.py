@@ -11,6 +11,7 @@ from app.api.job_answers import job_answer
 from app.api.models import AlignmentRequest, AssessmentRequest, Job, Rehearsal
 from app.api.waiting import wait_for
 from app.jobs.specs import Spec, align_spec, assess_spec, plan_spec, simulate_spec
+from app.jobs.specs_together import together_spec
 from app.store import inputs, jobs, projects
 from app.store.tables import JobRow
 from planner.keypoint import KeyPoint, KeyPointList
@@ -51,11 +52,15 @@ def align(
     response: Response,
     body: Annotated[AlignmentRequest, Body()] = AlignmentRequest(),  # noqa: B008
 ) -> Job:
-    """Find the part from scans and write the corrected program."""
-    options = body.model_dump(mode="json", exclude={"scans"})
+    """Find the part from scans and write the corrected program; with scans of other projects of the part, all of theirs."""
+    options = body.model_dump(mode="json", exclude={"scans", "together"})
     with ctx.store.db.read() as session:
         projects.get(session, project_id)
-        spec = align_spec(session, project_id, body.scans, options)
+        if body.together:
+            wanted = [(project_id, body.scans), *((other.project, other.scans) for other in body.together)]
+            spec = together_spec(session, wanted, options)
+        else:
+            spec = align_spec(session, project_id, body.scans, options)
     return job_answer(ctx.runner, _submit(ctx, project_id, "alignment", spec, response))
 
 
@@ -120,5 +125,6 @@ def _done(ctx: Context, project_id: str, kind: str, spec: dict[str, Any]) -> Job
             return None
         if kind == "simulate":
             return row if any(s.number == number for s in scans.all_scans(session, project_id)[-1:]) else None
-        newest = results.latest(session, project_id, kind)
-        return row if newest is not None and newest.number == number else None
+        made = {project_id: number} | {o["project"]: o["number"] for o in (row.result or {}).get("together", [])}
+        newest = {pid: results.latest(session, pid, kind) for pid in made}
+        return row if all(n is not None and n.number == made[pid] for pid, n in newest.items()) else None

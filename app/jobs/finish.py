@@ -4,6 +4,7 @@ from typing import Any
 
 from sqlalchemy.orm import Session
 
+from app.jobs import finish_together
 from app.jobs.payload import Outcome
 from app.store import inputs, jobs, results, scans
 from app.store.blobs import Blob
@@ -32,6 +33,8 @@ def finish(store: Store, job_id: str, outcome: Outcome) -> list[JobRow]:
         raise
     if row.state == "done" and row.kind in WHAT:
         store.tell(row.project_id, WHAT[row.kind], **(row.result or {}))
+        for other in (row.result or {}).get("together", []):
+            store.tell(other["project"], WHAT[row.kind], number=other["number"], verdict=other["verdict"])
         if row.result and row.result.get("keypoints_set"):
             store.tell(row.project_id, "keypoints")
     return [row]
@@ -50,6 +53,8 @@ def _rows(session: Session, row: JobRow, outcome: Outcome) -> dict[str, Any]:
             session, pid, {name: files["scan.csv"]}, "simulated", None, options["path"], {"options": options}
         )
         return {"number": scan.number}
+    if spec["options"].get("together"):
+        return finish_together.rows(session, row, files, data)
     made_from = dict(spec["inputs"])
     extra: dict[str, Any] = {}
     if row.kind == "plan":

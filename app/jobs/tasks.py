@@ -11,6 +11,7 @@ from typing import Any
 
 from app.folder import write_artifacts
 from app.jobs.payload import Progress
+from app.jobs.specs_together import FOLDER
 from planner.keypoint import KeyPointList
 from planner.setup import Setup
 
@@ -58,11 +59,32 @@ def _simulate(
 
 def _align(workflow: str, inputs: Path, outputs: Path, options: dict[str, Any], progress: Progress) -> dict[str, Any]:
     steps = import_module(workflow)
+    if options.get("together"):
+        return _align_together(steps, inputs, outputs, options, progress)
     wanted = {name: options[name] for name in ("method", "edges", "non_rigid", "base")}
     chosen = steps.AlignOptions.from_folder(inputs, **wanted)
     done = steps.align(inputs, [inputs / name for name in options["scan_files"]], chosen, progress)
     write_artifacts(outputs, done.artifacts)
     return {"summary": done.correction}
+
+
+def _align_together(
+    steps: Any, inputs: Path, outputs: Path, options: dict[str, Any], progress: Progress
+) -> dict[str, Any]:
+    """Align the project asked and others; what is made for these lies in `together/<k>/`."""
+    others = options["together"]
+    chosen = [("", options["name"], options)]
+    chosen += [(f"{FOLDER}/{k}", other["name"], other["options"]) for k, other in enumerate(others, start=1)]
+    items = []
+    for place, name, own in chosen:
+        folder = inputs / place
+        wanted = {key: own[key] for key in ("method", "edges", "non_rigid", "base")}
+        scans = [folder / file for file in own["scan_files"]]
+        items.append(steps.PlanScans(folder, scans, steps.AlignOptions.from_folder(folder, **wanted), name))
+    made = steps.align_together(items, progress)
+    for (place, _, _), one in zip(chosen, made, strict=True):
+        write_artifacts(outputs / place, one.artifacts)
+    return {"summary": made[0].correction, "together": [one.correction for one in made[1:]]}
 
 
 def _assess(workflow: str, inputs: Path, outputs: Path, options: dict[str, Any], progress: Progress) -> dict[str, Any]:

@@ -8,12 +8,12 @@ from app.store.inputs import current
 from app.store.results import correction_in_force, latest
 from app.store.scans import all_scans
 from app.store.store import VERSION
-from app.store.tables import INPUT_KINDS, ResultRow
+from app.store.tables import INPUT_KINDS, ProjectRow, ResultRow
 
 IN_WORDS = {
     "part": "the part", "setup": "the setup", "surface": "the inspection surface", "keypoints": "the key points",
     "version": "the version of EchoBase", "plan": "the plan", "scans": "a scan that was deleted",
-    "correction": "the alignment in force",
+    "correction": "the alignment in force", "together": "the plan or a scan of a project aligned together with it",
 }  # fmt: skip
 
 
@@ -35,10 +35,25 @@ def changed_since(session: Session, row: ResultRow) -> list[str]:
     present = {scan.sha256 for scan in all_scans(session, row.project_id)}
     if not set(row.inputs["scans"]) <= present:
         changed.append("scans")
+    if any(_moved_on(session, other) for other in row.inputs.get("together", [])):
+        changed.append("together")
     # An assessment judges the program of one correction: beside another program it proves nothing.
     if "correction" in row.inputs and row.inputs["correction"] != correction_in_force(session, row.project_id):
         changed.append("correction")
     return sorted(set(changed))
+
+
+def _moved_on(session: Session, other: dict[str, Any]) -> bool:
+    """Return whether another project no longer has the plan or a scan that determined a common correction.
+
+    A project that is not here (deleted, or left behind by an import) cannot have changed: correction.json names its digests.
+    """
+    if session.get(ProjectRow, other["project"]) is None:
+        return False
+    plan = latest(session, other["project"], "plan")
+    if plan is None or plan.sha256 != other["plan"] or changed_since(session, plan):
+        return True
+    return not set(other["scans"]) <= {scan.sha256 for scan in all_scans(session, other["project"])}
 
 
 def in_words(changed: list[str]) -> str:

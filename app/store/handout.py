@@ -48,7 +48,7 @@ def permitted(session: Session, project_id: str, which: str) -> tuple[ResultRow,
         raise refuse(409, f"{kind}-missing", f"there is no {kind} yet.", remedy, which)
     changed = changed_since(session, row)
     if changed:
-        remedy = "Plan again." if kind == "plan" or set(changed) - {"scans"} else "Align again."
+        remedy = "Plan again." if kind == "plan" or set(changed) - {"scans", "together"} else "Align again."
         text = f"the {which} program is stale: {in_words(changed)} changed since."
         raise refuse(409, "program-stale", text, remedy, which)
     if kind == "alignment":

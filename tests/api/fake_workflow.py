@@ -152,6 +152,22 @@ def align(folder: Path, scans, options: AlignOptions, progress):
 
 
 @dataclass(frozen=True)
+class PlanScans:
+    folder: Path
+    scans: list[Path]
+    options: AlignOptions
+    name: str
+
+
+def align_together(items: list[PlanScans], progress):
+    made = [align(item.folder, item.scans, item.options, progress) for item in items]
+    for item, one in zip(items, made, strict=True):
+        one.correction["called"] = item.name
+        one.artifacts["correction/correction.json"] = json.dumps(one.correction).encode()
+    return made
+
+
+@dataclass(frozen=True)
 class AssessOptions:
     before: tuple[Path, ...] = ()
     base: str | None = None
