@@ -77,13 +77,17 @@ def put_keypoints(
 
 @router.get("/record", responses=documented(404))
 def get_record(ctx: Ctx, project_id: ProjectId, response: Response, version: Version = None) -> Record:
-    """Return what people wrote down of the inspection (`record.json`); empty fields print as blanks."""
+    """Return the record that results to come take over (`record.json`); empty fields print as blanks."""
     return Record.model_validate(_read(ctx, project_id, "record", response, version))
 
 
 @router.put("/record", responses=documented(404, 412))
 def put_record(ctx: Ctx, project_id: ProjectId, body: Record, response: Response, if_match: IfMatch = None) -> Record:
-    """Replace the record. Reports downloaded from now on show it; nothing has to be aligned again."""
+    """Replace the record of results to come. Each alignment and assessment keeps the one it was made with.
+
+    Results made before anything was written down take the first record. A result's own is edited at its own address
+    (`PUT alignments/{n}/record`, `PUT assessments/{n}/record`).
+    """
     row = inputs.put(ctx.store, project_id, "record", body.model_dump(mode="json"), expected(if_match))
     tag(response, row.version)
     return body

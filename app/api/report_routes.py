@@ -8,14 +8,17 @@ from sqlalchemy.orm import Session
 from app.api.context import Context, Ctx, Number, ProjectId
 from app.api.downloads import attachment, disposition, zipped
 from app.api.errors import documented
+from app.api.etags import IfMatch, expected, tag
 from app.report.document import Acceptance
 from app.report.package import Report, stored
+from app.report.record import Record
 from app.security import CSP_DOCUMENT
 from app.store import projects, results
 from app.store.content import get_bytes
 from app.store.freshness import changed_since, in_words
-from app.store.inputs import files_of, record_in
+from app.store.inputs import files_of
 from app.store.refusal import not_found
+from app.store.result_records import edit, record_in, record_of
 from app.store.tables import FileRow, ResultRow
 
 router = APIRouter(prefix="/projects/{project_id}", tags=["results"])
@@ -43,7 +46,7 @@ def get_report(
     format: Annotated[Format, Query(description="HTML is one file without scripts.")] = "html",
     download: Annotated[bool, Query(description="As an attachment.")] = False,
 ) -> Response:
-    """Return the report of an alignment or assessment, with the record as it is now and who accepted the result."""
+    """Return the report of an alignment or assessment, with its own record and who accepted the result."""
     with ctx.store.db.read() as session:
         project = projects.get(session, project_id)
         row = results.get_result(session, project_id, kind, number)
@@ -88,8 +91,39 @@ def get_files(ctx: Ctx, project_id: ProjectId, kind: Kind, number: Number) -> Re
     return attachment(zipped(documents), f"{project.name} {kind} {number}.zip", "application/zip")
 
 
+@router.get("/{kind}s/{number}/record", responses=documented(404))
+def get_record(ctx: Ctx, project_id: ProjectId, kind: Kind, number: Number, response: Response) -> Record:
+    """Return the record of a result: as the project's was when it was made, or as last edited for it."""
+    with ctx.store.db.read() as session:
+        projects.get(session, project_id)
+        row = record_of(session, results.get_result(session, project_id, kind, number))
+    tag(response, row.version)
+    return Record.model_validate(row.content)
+
+
+@router.put("/{kind}s/{number}/record", responses=documented(404, 412))
+def put_record(
+    ctx: Ctx,
+    project_id: ProjectId,
+    kind: Kind,
+    number: Number,
+    body: Record,
+    response: Response,
+    if_match: IfMatch = None,
+) -> Record:
+    """Replace the record of one result; its reports show it from now on, those of other results stay as they are."""
+    with ctx.store.db.write() as session:
+        projects.get(session, project_id)
+        result = results.get_result(session, project_id, kind, number)
+        row, changed = edit(session, result, body.model_dump(mode="json"), expected(if_match))
+    if changed:
+        ctx.store.tell(project_id, "record", of=f"{kind} {number}", version=row.version)
+    tag(response, row.version)
+    return body
+
+
 def _report(ctx: Context, session: Session, row: ResultRow, files: dict[str, FileRow]) -> Report | None:
-    """Return the report with the record and the acceptance of now; None for a result that was made without one."""
+    """Return the report with the result's record and acceptance; None for a result that was made without one."""
     folder = FOLDER[row.kind]
     document = files.get(f"{folder}/report.document.json")
     if document is None:
@@ -102,7 +136,7 @@ def _report(ctx: Context, session: Session, row: ResultRow, files: dict[str, Fil
     }
     accepted = Acceptance.model_validate(row.accepted) if row.accepted else None
     made = stored(get_bytes(ctx.store.blobs, document.sha256), drawn)
-    return made.completed(record_in(session, row.project_id), accepted, row.created, _outdated(session, row))
+    return made.completed(record_in(session, row), accepted, row.created, _outdated(session, row))
 
 
 def _outdated(session: Session, row: ResultRow) -> str:

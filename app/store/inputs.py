@@ -49,11 +49,11 @@ def defaults() -> dict[str, Any]:
 
 
 def current(session: Session, project_id: str, kind: str) -> Input:
-    """Return the input in force."""
+    """Return the input in force. Of a result's own record (`record-al-3`, `store.result_records`) what was edited."""
     newest = select(InputRow).where(InputRow.project_id == project_id, InputRow.kind == kind)
     row = session.scalars(newest.order_by(InputRow.version.desc()).limit(1)).first()
     if row is None:
-        content = defaults()[kind]
+        content = defaults()[kind.partition("-")[0]]
         return Input(kind, 0, "" if content is None else digest_of(content), content)
     return Input(kind, row.version, row.sha256, json.loads(row.content))
 
@@ -140,11 +140,6 @@ def files_of(session: Session, project_id: str, owner: str) -> dict[str, FileRow
 def setup_in(session: Session, project_id: str) -> Setup:
     """Return the settings in force."""
     return Setup.model_validate(current(session, project_id, "setup").content)
-
-
-def record_in(session: Session, project_id: str) -> Record:
-    """Return what people wrote down of the inspection."""
-    return Record.model_validate(current(session, project_id, "record").content)
 
 
 def keypoints_in(session: Session, project_id: str) -> list[KeyPoint]:

@@ -31,7 +31,7 @@ class _ProjectPart(_Strict):
 
 
 class _InputPart(_Strict):
-    kind: Literal["part", "setup", "surface", "keypoints", "record"]
+    kind: Annotated[str, Field(pattern=r"^(part|setup|surface|keypoints|record(-a[ls]-[0-9]{1,6})?)$")]
     version: Count
     sha256: Sha
     content: str
@@ -125,7 +125,7 @@ def _input_digest(row: _InputPart, content: Any, files: dict[str, dict[str, str]
         return digest_of({"file": files[f"part:{row.version}"]["source"], "unit": content["unit"]})
     if row.kind == "setup":
         Setup.model_validate(content)
-    elif row.kind == "record":
+    elif row.kind.startswith("record"):
         Record.model_validate(content)
     elif row.kind == "keypoints":
         KeyPointList.validate_python(content)

@@ -7,11 +7,12 @@ from sqlalchemy.orm import Session
 
 from app.store.blobs import Blob
 from app.store.content import digest_of_files
-from app.store.inputs import add_files, files_of
+from app.store.inputs import add_files, current, files_of
 from app.store.journal import note
 from app.store.names import clean_text, now
 from app.store.projects import get, touch
 from app.store.refusal import not_found
+from app.store.result_records import VERSION_KEY, copy
 from app.store.tables import ResultRow
 
 
@@ -19,8 +20,10 @@ def add(
     session: Session, project_id: str, kind: str, files: dict[str, Blob], inputs: dict[str, Any], options: dict[str, Any],
     verdict: str, summary: dict[str, Any],
 ) -> ResultRow:  # fmt: skip
-    """Add a result with its files."""
+    """Add a result with its files. The record in force is the one of this result, whatever is written down later."""
     get(session, project_id)
+    if kind != "plan":
+        inputs = {VERSION_KEY: current(session, project_id, "record").version} | inputs
     of_kind = (ResultRow.project_id == project_id, ResultRow.kind == kind)
     highest = session.scalar(select(func.max(ResultRow.number)).where(*of_kind))
     sha256 = digest_of_files((name, blob.sha256) for name, blob in files.items())
@@ -76,6 +79,7 @@ def again(session: Session, row: ResultRow) -> ResultRow:
     made = add(session, row.project_id, row.kind, files, row.inputs, row.options, row.verdict, row.summary)
     # It was made when it was made; the journal says when it was taken up again.
     made.accepted, made.created = row.accepted, row.created
+    copy(session, row, made)
     note(session, row.project_id, f"{row.kind}-used-again", number=made.number, made_as=row.number)
     return made
 
