@@ -18,6 +18,7 @@ from starlette.types import Scope
 
 from app.api import (
     archive_routes,
+    batch_routes,
     cell_routes,
     errors,
     inputs,
@@ -97,6 +98,7 @@ def create_app(settings: ServerSettings) -> FastAPI:
         result_routes,
         state_routes,
         together_routes,
+        batch_routes,
         job_routes,
     ):
         app.include_router(module.router, prefix=PREFIX)

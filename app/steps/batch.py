@@ -7,6 +7,7 @@ import zipfile
 from collections import Counter
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
+from functools import cached_property
 from pathlib import Path
 from typing import Any
 
@@ -48,7 +49,12 @@ class BatchResult:
     issues: tuple[Issue, ...]
     found: Batch
     shapes: Shapes | None
-    report: Report
+    plan: Plan
+
+    @cached_property
+    def report(self) -> Report:
+        """The same as a report."""
+        return batch_report(self.plan, self.found, self.shapes, self.content)
 
     @property
     def artifacts(self) -> Artifacts:
@@ -109,7 +115,7 @@ def judge_batch(plan: Plan, items: Sequence[BatchItem]) -> BatchResult:
             "parts": [{"name": i.name, "sha256": i.sha256, "simulated": i.simulated} for i in used],
         },
     }
-    return BatchResult(content, tuple(issues), found, shapes, batch_report(plan, found, shapes, content))
+    return BatchResult(content, tuple(issues), found, shapes, plan)
 
 
 def _left_out(item: BatchItem, why: str, remedy: str) -> Issue:

@@ -3,6 +3,7 @@
 import { API, get, post } from "../api.js";
 import { askAcceptance } from "../dialog.js";
 import { button, h } from "../dom.js";
+import { batch, candidates } from "../drawer/batch.js";
 import { drawing } from "../drawer/figure.js";
 import { histograms } from "../drawer/plots.js";
 import { directions, matches, runs } from "../drawer/tables.js";
@@ -137,9 +138,17 @@ export async function accept(shell, a) {
   if (answer) await shell.do(async () => { await post(`${shell.project.path}/alignments/${a.number}/accept`, answer); await shell.project.load(["alignment"]); });
 }
 
+/** Which alignments are compared as serial parts: all, until somebody unticks one; new ones come ticked. */
+function chosenParts(shell, parts) {
+  const local = (shell.local.batch ??= { known: new Set(), chosen: new Set() });
+  for (const { number } of parts) if (!local.known.has(number)) { local.known.add(number); local.chosen.add(number); }
+  return local.chosen;
+}
+
 export function drawer(shell) {
   const { alignment: a, alignments: all = [] } = shell.project.data;
   if (!a) return { tabs: [], stamp: "" };
+  const parts = candidates(all);
   const path = (n, name) => `${shell.project.path}/alignments/${n}/figures/${name}`;
   return { stamp: `${a.number} ${a.stale} ${all.length}`, tabs: [
     { key: "histogram", title: "Before and after", draw: async (body, alive) => histograms(body, alive, await get(`${shell.project.path}/charts/deviation`)) },
@@ -148,5 +157,6 @@ export function drawer(shell) {
     { key: "points", title: "Key points", draw: (body) => matches(body, a.keypoints, (id) => shell.view.send({ focus: id })) },
     { key: "directions", title: "Directions", draw: (body) => directions(body, a.directions) },
     ...(all.length > 1 ? [{ key: "runs", title: "All alignments", draw: (body) => runs(body, all, (n) => `${API}${shell.project.path}/alignments/${n}/report`) }] : []),
+    ...(parts.length > 1 ? [{ key: "batch", title: "Batch", draw: (body, alive) => batch(body, alive, shell.project.path, parts, chosenParts(shell, parts)) }] : []),
   ] };
 }

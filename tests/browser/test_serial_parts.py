@@ -1,0 +1,76 @@
+"""Serial parts in the page: the tab appears with the second part, parts are ticked on and off, the report opens."""
+
+import json
+import urllib.request
+
+import pytest
+
+from tests.browser.eyes import Watch
+from tests.browser.real_server import RealServer
+
+pytestmark = [pytest.mark.browser, pytest.mark.slow, pytest.mark.timeout(600)]
+KEYS = ("x_mm", "y_mm", "z_mm", "a_deg", "b_deg", "c_deg")
+OFFSETS = ((1.1, -0.7, 1.0, 0.2, -0.8, 0.5), (1.2, -0.5, 0.9, 0.22, -0.75, 0.45), (0.9, -0.9, 1.1, 0.15, -0.8, 0.5))
+
+
+@pytest.fixture(scope="module")
+def server(tmp_path_factory):
+    made = RealServer(tmp_path_factory.mktemp("serial") / "data")
+    yield made
+    made.stop()
+
+
+def rest(server, path, method="GET", body=None):
+    sent = None if body is None else json.dumps(body).encode()
+    request = urllib.request.Request(
+        f"{server.url}/api/v1{path}", sent, {"Content-Type": "application/json"}, method=method
+    )
+    with urllib.request.urlopen(request) as answer:
+        return json.load(answer)
+
+
+def done(server, path, body):
+    job = rest(server, path, "POST", body)
+    with urllib.request.urlopen(f"{server.url}/api/v1/jobs/{job['id']}/events") as events:
+        events.read()
+    assert rest(server, f"/jobs/{job['id']}")["state"] == "done"
+
+
+def test_parts_are_compared_and_can_be_left_out(server, chromium):
+    pid = rest(server, "/projects", "POST", {"name": "Plates", "sample": "flat-plate"})["id"]
+    done(server, f"/projects/{pid}/plan", {})
+    for seed, offset in enumerate(OFFSETS):
+        done(server, f"/projects/{pid}/simulate", {"offset": dict(zip(KEYS, offset, strict=True)), "seed": seed})
+        newest = rest(server, f"/projects/{pid}/scans")[-1]["number"]
+        done(server, f"/projects/{pid}/alignments", {"scans": [newest]})
+    context = chromium.new_context(viewport={"width": 1280, "height": 800})
+    page = context.new_page()
+    watch = Watch(server.url).on(page)
+    page.goto(f"{server.url}/#/p/{pid}/alignment")
+    page.get_by_role("tab", name="Batch").click()
+    table = page.locator(".drawer .batch table")
+    table.wait_for()
+    said = rest(server, f"/projects/{pid}/batch")
+    assert table.locator("th").first.inner_text() == "3 parts, BASE"
+    common = table.locator("tr", has_text="common").locator("td").all_inner_texts()[1:]
+    digits = {"deg": 4, "mm": 3}
+    assert [float(v.replace("\N{MINUS SIGN}", "-")) for v in common] == [
+        pytest.approx(d["mean"], abs=0.6 * 10 ** -digits[d["unit"]]) for d in said["directions"]
+    ]
+    assert table.locator("svg.strip circle").count() == 3 * len(said["directions"])
+    tabs = page.locator(".drawer .tabs .tab")
+    assert len({round(tabs.nth(i).bounding_box()["height"]) for i in range(tabs.count())}) == 1
+    # Everything is in sight without scrolling sideways.
+    assert page.locator(".drawer .body").evaluate("n => n.scrollWidth - n.clientWidth") <= 1
+    page.locator("input[name='part-2']").uncheck()
+    page.locator(".drawer th", has_text="2 parts").wait_for()
+    assert "not told" in table.locator("tr", has_text="scatter").first.inner_text()
+    with context.expect_page() as opened:
+        page.get_by_role("link", name="Report of the batch: open").click()
+    opened.value.locator("h1", has_text="Batch of serial parts").wait_for()
+    assert "2 parts cannot tell" in opened.value.content()
+    page.locator("input[name='part-3']").uncheck()
+    page.get_by_text("Choose two parts or more.").wait_for()
+    assert watch.complaints == []
+    assert watch.foreign == []
+    context.close()
