@@ -1,5 +1,7 @@
 """The few poses a robot needs: within tolerance of the dense path whether it runs chords or a spline through them."""
 
+from dataclasses import dataclass
+
 import numpy as np
 
 from planner.errors import fail
@@ -12,9 +14,10 @@ from planner.toolpath import ToolPath
 # Growth of the spacing along the path: (1 + g/2) / (1 - g/2) = 1.5 from one to the next leaves room for rounding.
 _GROWTH = 0.4
 _MARGIN = 0.95
-# Knots are this much of the longest spacing apart at most: chords and arcs, and the last digit that is written.
+# Between poses, knots are this much of the longest spacing apart at most: the last digit that is written, and a pose moved.
 _FILL = 0.999
 _ROUNDS = 12
+_SHY = 0.98
 _GRADINGS = 60
 
 
@@ -40,16 +43,42 @@ def decimate(
     b = blocks_of(path)
     if len(b.row) == 0:
         return path
-    tolerance = (_MARGIN * chord_tol_mm, _MARGIN * float(np.radians(angle_tol_deg)))
-    longest = _FILL * max_spacing_mm
-    knots = knots_at(b, _first_choice(b, *tolerance, longest))
-    for _ in range(_ROUNDS):
-        knots = _graded(b, knots, longest, max_ratio)
-        more = _in_violated(b, knots, *tolerance)
+    limits = _Limits(_MARGIN * chord_tol_mm, _MARGIN * float(np.radians(angle_tol_deg)), max_spacing_mm, max_ratio)
+    knots, rough = _thinned(b, limits, on_poses=False)
+    if len(rough):
+        # Between the poses of a rough pass nothing is known well: its knots are poses where these can keep the limits with
+        # no more of them.
+        poses, _ = _thinned(b.only(np.isin(b.block, rough)), limits, on_poses=True)
+        n = int(b.block[-1]) + 1
+        dense, free, bound = (np.bincount(x, minlength=n) for x in (b.block, knots.block, poses.block))
+        better = (bound > 0) & ((free > dense) | ((bound <= free) & (_ratio(poses, n) <= max_ratio * (1.0 + 1e-6))))
+        knots = knots_at(b, np.sort(np.concatenate([knots.s[~better[knots.block]], poses.s[better[poses.block]]])))
+    return with_knots(path, b, knots)
+
+
+@dataclass(frozen=True)
+class _Limits:
+    """Tolerances (mm, rad), the longest spacing (mm), and how much larger than the one beside it a spacing may be."""
+
+    mm: float
+    rad: float
+    longest_mm: float
+    ratio: float
+
+
+def _thinned(b: Blocks, limits: _Limits, on_poses: bool) -> tuple[Knots, Ints]:
+    """Return knots that keep the limits, and the blocks that did not with the first choice. on_poses: all are poses."""
+    knots = knots_at(b, _first_choice(b, limits, on_poses))
+    rough = np.zeros(0, dtype=np.int64)
+    for k in range(_ROUNDS):
+        knots = _graded(b, knots, limits, on_poses)
+        more = _in_violated(b, knots, limits)
         if not len(more):
             break
+        if k == 0:
+            rough = np.unique(knots_at(b, more).block)
         knots = knots_at(b, _merged(knots.s, more))
-    return with_knots(path, b, knots)
+    return knots, rough
 
 
 def deviation(dense: ToolPath, sparse: ToolPath) -> tuple[float, float, float, float]:
@@ -91,9 +120,9 @@ def _merged(s: Array, more: Array) -> Array:
     return every[np.concatenate([[True], np.diff(every) > 1e-6])]
 
 
-def _first_choice(b: Blocks, tol_mm: float, tol_rad: float, longest: float) -> Array:
+def _first_choice(b: Blocks, limits: _Limits, on_poses: bool) -> Array:
     """Return places spaced by the local curvature and turn: sag = k h^2 / 8, as far as the growth allows."""
-    h = _curvature_spacing(b, tol_mm, tol_rad, longest)
+    h = _curvature_spacing(b, limits, on_poses)
     forward = np.minimum.accumulate(h - _GROWTH * b.s) + _GROWTH * b.s
     h = np.minimum.accumulate((forward + _GROWTH * b.s)[::-1])[::-1] - _GROWTH * b.s
     step = np.diff(b.s)
@@ -109,24 +138,41 @@ def _first_choice(b: Blocks, tol_mm: float, tol_rad: float, longest: float) -> A
     section = np.repeat(np.arange(len(a)), pieces)
     rank = np.arange(len(section)) - np.repeat(np.cumsum(pieces) - pieces, pieces)
     want = (running[a][section] + amount[section] * rank / pieces[section])[rank > 0]
-    return _merged(b.s[end], np.interp(want, running, b.s))
+    places = np.interp(want, running, b.s)
+    return _merged(b.s[end], _nearest(b, places) if on_poses else places)
 
 
-def _curvature_spacing(b: Blocks, tol_mm: float, tol_rad: float, longest: float) -> Array:
-    h = np.full(len(b.s), longest)
+def _curvature_spacing(b: Blocks, limits: _Limits, on_poses: bool) -> Array:
+    step = np.diff(b.s)
+    step[np.diff(b.block) > 0] = 0.0
+    step = np.maximum(np.append(step, 0.0), np.append(0.0, step))
+    longest = np.full(len(b.s), _FILL * limits.longest_mm)
+    if on_poses:
+        # A whole number of steps.
+        whole = np.maximum(np.floor(limits.longest_mm / np.maximum(step, 1e-9) * (1.0 + 1e-6)), 1.0) * step
+        longest = np.where(whole > 0.0, np.minimum(whole, limits.longest_mm), limits.longest_mm)
+    h = longest
     turn = b.bend[:, 3:]
     # A steady turn bends the quaternion too; only the part along the sphere counts.
     radial = np.einsum("ij,ij->i", turn, b.wxyz)
     along = np.sqrt(np.maximum(np.einsum("ij,ij->i", turn, turn) - radial**2, 0.0))
-    for k, tol in ((np.linalg.norm(b.bend[:, :3], axis=1), tol_mm), (2.0 * along, tol_rad)):
+    for k, tol in ((np.linalg.norm(b.bend[:, :3], axis=1), limits.mm), (2.0 * along, limits.rad)):
         h = np.minimum(h, np.sqrt(8.0 * tol / np.maximum(k, 1e-12)))
-    step = np.diff(b.s)
-    step[np.diff(b.block) > 0] = 0.0
-    return np.minimum(np.maximum(h, np.maximum(np.append(step, 0.0), np.append(0.0, step))), longest)
+    return np.minimum(np.maximum(h, step), longest)
 
 
-def _graded(b: Blocks, knots: Knots, longest: float, ratio: float) -> Knots:
+def _ratio(knots: Knots, blocks: int) -> Array:
+    """Return the largest ratio of neighbouring spacings in each block (blocks,)."""
+    d = np.maximum(np.linalg.norm(np.diff(knots.y[:, :3], axis=0), axis=1), 1e-9)
+    same = knots.block[2:] == knots.block[:-2]
+    ratio = np.zeros(blocks)
+    np.maximum.at(ratio, knots.block[2:][same], np.maximum(d[1:] / d[:-1], d[:-1] / d[1:])[same])
+    return ratio
+
+
+def _graded(b: Blocks, knots: Knots, limits: _Limits, on_poses: bool) -> Knots:
     """Return the knots with more of them, until no spacing is too long or too unlike its neighbours."""
+    longest, ratio = limits.longest_mm * (1.0 if on_poses else _FILL), limits.ratio
     for _ in range(_GRADINGS):
         same = knots.block[1:] == knots.block[:-1]
         d = np.where(same, np.linalg.norm(np.diff(knots.y[:, :3], axis=0), axis=1), np.inf)
@@ -134,13 +180,21 @@ def _graded(b: Blocks, knots: Knots, longest: float, ratio: float) -> Knots:
         right = np.concatenate([np.where(same[1:], d[1:], np.inf), [np.inf]])
         small = np.minimum(left, right)
         limit = np.minimum(longest, ratio * small)
-        wrong = np.flatnonzero(same & (d > limit * (1.0 + 1e-9)))
+        room = np.diff(knots.before) > 1 if on_poses else True
+        wrong = np.flatnonzero(same & room & (d > limit * (1.0 + 1e-9)))
         if not len(wrong):
             break
         # The piece next to the smaller neighbour is half, or as much as that neighbour allows.
-        share = np.minimum(0.5, np.where(d[wrong] > longest, 0.5, 0.98 * ratio * small[wrong] / d[wrong]))
-        share = np.where(left[wrong] <= right[wrong], share, 1.0 - share)
-        knots = knots_at(b, _merged(knots.s, (1.0 - share) * knots.s[wrong] + share * knots.s[wrong + 1]))
+        share = np.minimum(0.5, np.where(d[wrong] > longest, 0.5, _SHY * ratio * small[wrong] / d[wrong]))
+        from_left = left[wrong] <= right[wrong]
+        share = np.where(from_left, share, 1.0 - share)
+        at = (1.0 - share) * knots.s[wrong] + share * knots.s[wrong + 1]
+        if on_poses:
+            # The pose next to it, on the side of the smaller neighbour.
+            a, z = knots.before[wrong], knots.before[wrong + 1]
+            row = np.searchsorted(b.s, at + np.where(from_left, 1e-9, -1e-9), side="right") - from_left
+            at = b.s[np.clip(row, a + 1, z - 1)]
+        knots = knots_at(b, _merged(knots.s, at))
     return knots
 
 
@@ -152,7 +206,7 @@ def _interval_of(b: Blocks, knots: Knots) -> Ints:
     return np.where(tail, i - 1, i)
 
 
-def _in_violated(b: Blocks, knots: Knots, tol_mm: float, tol_rad: float) -> Array:
+def _in_violated(b: Blocks, knots: Knots, limits: _Limits) -> Array:
     """Return a place (j,) in every interval where a dense pose is out of tolerance of the chord or of a spline.
 
     It is the dense pose nearest to the middle: kinks are poses, and stay.
@@ -160,7 +214,7 @@ def _in_violated(b: Blocks, knots: Knots, tol_mm: float, tol_rad: float) -> Arra
     interval = _interval_of(b, knots)
     out = np.zeros(len(b.s), dtype=bool)
     for mm, rad in _readings(b, knots, interval):
-        out |= (mm > tol_mm) | (rad > tol_rad)
+        out |= (mm > limits.mm) | (rad > limits.rad)
     bad = np.zeros(len(knots) - 1, dtype=bool)
     bad[interval[out]] = True
     lower, upper = knots.s[:-1][bad], knots.s[1:][bad]

@@ -43,6 +43,10 @@ class Blocks:
         """Orientations of the TCP (m, 4)."""
         return self.y[:, 3:]
 
+    def only(self, mask: NDArray[np.bool_]) -> "Blocks":
+        """Return the blocks that a mask of poses (m,) holds whole."""
+        return Blocks(self.row[mask], self.y[mask], self.s[mask], self.block[mask], self.bend[mask], self.ends[mask])
+
 
 def blocks_of(path: ToolPath) -> Blocks:
     """Return the blocks of a path."""

@@ -1,5 +1,6 @@
 """Decimation against scipy's CubicSpline, Slerp and a plain segment distance: written without the code under test."""
 
+from dataclasses import replace
 from functools import cache
 from itertools import pairwise
 
@@ -185,6 +186,19 @@ def test_poses_between_those_of_the_acquisition_stand_on_the_surface_and_face_it
     assert np.degrees(np.arccos(np.clip(np.einsum("ij,ij->i", -axes[:, :, 2], out), -1.0, 1.0))).max() < 0.01
     assert (np.abs(data.bary.sum(axis=1) - 1.0) < 1e-9).all()
     assert data.bary.min() > -1e-9
+
+
+def test_a_rough_surface_never_takes_more_poses_than_were_acquired() -> None:
+    """Vertices that scatter by 0.05 mm on edges of 5 mm: normals turn to and fro by a degree."""
+    panel = plate(200.0, 120.0)
+    rough = panel.vertices + np.random.default_rng(2).normal(0.0, 0.05, panel.vertices.shape)
+    dense = raster(curved_of(replace(panel, vertices=rough)), crystal(strategy="plane", step_mm=30.0))
+    sparse = decimate(dense)
+    assert len(sparse) <= len(dense)
+    for bc in ("natural", "not-a-knot"):
+        chord, spline = worst(dense, sparse, bc)
+        assert (chord <= (0.05, 0.1)).all()
+        assert (spline <= (0.05, 0.1)).all()
 
 
 def test_nonsense_tolerances_are_refused() -> None:
