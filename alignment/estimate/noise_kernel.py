@@ -30,6 +30,8 @@ NUGGET, PATH, LENGTH, GAP, TILT, FIELD, FIELD_LENGTH, EDGE_NUGGET, EDGE_PATH = r
 # Mean distance between two points of a rectangle, per its diagonal (0.37 for a square).
 MEAN_DISTANCE = 0.37
 FAR_MM = 1e9
+# So much path between two passes says that they belong to different scans, of which one knows nothing of the other.
+ANOTHER_SCAN_MM = 5e3
 
 
 @dataclass(frozen=True, eq=False)
@@ -65,7 +67,8 @@ class Kernel:
         start, end = np.full(passes, np.inf), np.full(passes, -np.inf)
         np.minimum.at(start, of_pass, self.rows.block_from_mm)
         np.maximum.at(end, of_pass, self.rows.block_to_mm)
-        between = np.r_[0.0, np.cumsum(np.maximum(start[1:] - end[:-1], 0.0))][:passes]
+        way = np.maximum(start[1:] - end[:-1], 0.0)
+        between = np.r_[0.0, np.cumsum(np.where(way < ANOTHER_SCAN_MM, way, 0.0))][:passes]
         a, b = self.rows.block_from_mm - between[of_pass], self.rows.block_to_mm - between[of_pass]
         return np.maximum(np.maximum(a[:, None] - b[None, :], a[None, :] - b[:, None]), 0.0)
 
