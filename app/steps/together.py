@@ -1,13 +1,15 @@
 """Scans of several surfaces of one part, each planned by itself: one correction, applied to every plan's inspection."""
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
 from alignment.estimate.several import SurfaceScan, align_several
 from app.steps.align import Alignment, AlignOptions, Prepared, Progress, complete, prepare
+from app.steps.programs import program_name
 from planner.errors import fail
+from planner.issues import Issue
 
 
 @dataclass(frozen=True)
@@ -52,8 +54,23 @@ def run_align_together(items: Sequence[PlanScans], progress: Progress) -> list[A
         def part(share: float, text: str, low: float = low, step: float = step, name: str = items[k].name) -> None:
             progress(low + step * share, f"{name}: {text}")
 
-        out.append(complete(one, rigid, False, part, [s for n, s in enumerate(said) if n != k]))
+        warned = replace(rigid, issues=(*rigid.issues, *_same_names(k, items, given)))
+        out.append(complete(one, warned, False, part, [s for n, s in enumerate(said) if n != k]))
     return out
+
+
+def _same_names(k: int, items: Sequence[PlanScans], given: Sequence[Prepared]) -> list[Issue]:
+    """Return a warning where another plan's programs are called as those of plan k: one would replace the other."""
+    names = [program_name(g.plan.part, "corrected") for g in given]
+    alike = [f"'{item.name}'" for n, item in enumerate(items) if n != k and names[n] == names[k]]
+    if not alike:
+        return []
+    text = f"the programs of {' and '.join(alike)} are called {names[k]} too: on the controller one replaces the other."
+    remedy = (
+        "Load one inspection after the other; or plan from copies of the CAD file with names of their own, which name the "
+        "programs."
+    )
+    return [Issue("warning", "programs-alike", text, remedy, "corrected")]
 
 
 def _said(name: str, given: Prepared) -> dict[str, Any]:

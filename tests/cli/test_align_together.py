@@ -48,6 +48,8 @@ def test_both_programs_get_the_one_correction(planned, capsys):
         assert said["scan_sha256"] == other["inputs"]["scan_sha256"]
         assert [s["name"] for s in one["surfaces"]] == ["top", "side"]
         assert one["centroid_mm"] != other["centroid_mm"]
+        # Both were planned from box.stl: their programs have one name.
+        assert [i["where"] for i in one["issues"] if i["code"] == "programs-alike"] == ["corrected"]
     values = np.array(list(found[0]["correction"].values()))
     np.testing.assert_allclose(values[:3], OFFSET[:3], atol=0.08)
     np.testing.assert_allclose(values[3:], OFFSET[3:], atol=0.03)

@@ -11,6 +11,7 @@ import { AXES, facts, fixed, isAngle, mm, ofAxis, pct, poseKey, whole } from "..
 import { signed } from "../journey.js";
 import { issueList, tag, toneOf, verdict, working } from "../status.js";
 import { compare } from "./compare.js";
+import { chosenOf, companions, surfaces } from "./together.js";
 
 export const watchesView = true;
 export const watchesJobs = true;
@@ -21,7 +22,7 @@ export function content(shell) {
   const { alignment: a, scans, setup } = shell.project.data;
   const local = (shell.local.alignment ??= { method: "map", edges: "", non_rigid: false, layer: "after" });
   if (shell.busy("alignment")) return working(shell, "Aligning", "alignment");
-  if (!a) return [verdict("none", "Not aligned yet", scans?.length ? "The alignment finds the part from the readings." : "Upload a scan, or rehearse one, first."), options(shell, local)];
+  if (!a) return [verdict("none", "Not aligned yet", scans?.length ? "The alignment finds the part from the readings." : "Upload a scan, or rehearse one, first."), companions(shell, local), options(shell, local)];
   const { layers: on, legend } = shell.view.state ?? {};
   shell.view.say(a.verdict !== "fail" && !a.stale && on?.after && !legend ? "Drawing the deviation map…" : null);
   const [word, text] = WORDS[a.verdict] ?? [a.verdict, ""];
@@ -34,9 +35,11 @@ export function content(shell) {
     paper(a, hidden(shell, a)),
     a.verdict !== "fail" && !a.stale && layers(shell, local),
     before(a),
+    surfaces(a),
     sprang(a.non_rigid),
     facts([["Residual, rms", mm(a.residual?.rms_mm), "mm"], ["Residual, 95 %", mm(a.residual?.p95_mm), "mm"], ["Readings used", whole(a.residual?.readings)], ["Method", h("span", {}, a.method === "map" ? "MAP, all readings" : "key points (paper)")]]),
     a.verdict === "pass" && issueList(a.issues, 8),
+    companions(shell, local),
     options(shell, local),
   ];
 }
@@ -82,7 +85,7 @@ function paper(a, truth) {
 /** Offer to follow the shape of a part that is not as its CAD. */
 function follow(shell, a, local) {
   if (a.stale || a.options?.non_rigid || !a.issues?.some((i) => SHAPED.has(i.code))) return null;
-  return h("div", { class: "row" }, button("Run as non-rigid, following its shape", () => { local.method = "map"; local.non_rigid = true; local.open = true; run(shell, local); }, { key: "follow" }));
+  return h("div", { class: "row" }, button("Run as non-rigid, following its shape", () => { local.method = "map"; local.non_rigid = true; local.open = true; local.together?.clear(); run(shell, local); }, { key: "follow" }));
 }
 
 /** What was found of a part that sprang back. */
@@ -116,7 +119,7 @@ function options(shell, local) {
 function run(shell, local) {
   return shell.do(async () => {
     const { method, non_rigid } = local;
-    await shell.project.run("/alignments", { method, non_rigid: method === "map" && non_rigid, ...(local.edges ? { edges: local.edges === "true" } : {}) });
+    await shell.project.run("/alignments", { method, non_rigid: method === "map" && non_rigid, ...(local.edges ? { edges: local.edges === "true" } : {}), ...chosenOf(local) });
     local.layer = "after";
     if (shell.step === "alignment") await shell.view.send({ step: "alignment" });
   });
