@@ -1,7 +1,7 @@
 """Least squares whose readings share the errors of a robot that is off by hundredths, and stays off for centimetres."""
 
 from collections.abc import Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -20,6 +20,9 @@ LENGTHS_MM = (3.0, 10.0, 30.0, 100.0)
 FLOOR = {"distance": 5e-4, "level": 5e-3, "pose": 1e-4}
 CEILING = 2.0
 # Of a logarithm, as long as only the correlation is to be chosen.
+# Noise this much less likely than the best is none to reckon with.
+UNLIKELY = 0.05
+IMPOSSIBLE = 1e12
 COARSE = {"xatol": 0.05}
 
 
@@ -43,7 +46,7 @@ class Noise:
     """Standard deviations: of distances (mm) and levels (dB) apart from the robot, of the robot per axis (mm).
 
     `pose_mm` is correlated as exp(-distance / length_mm), distance by `metric`. independent: number of
-    independent robot errors that the stations amount to.
+    independent robot errors that the stations amount to. rivals: (likelihood over the best, noise) of what else may be.
     """
 
     distance_mm: float
@@ -52,6 +55,7 @@ class Noise:
     length_mm: float
     metric: str
     independent: float
+    rivals: "tuple[tuple[float, Noise], ...]" = ()
 
 
 def stations(rotation: Array, origin_base: Array) -> Stations:
@@ -137,7 +141,10 @@ def fit_noise(sums: Sums, prior: Array, at: Stations, start: Noise, anew: bool =
         sigma = dict(zip(kinds, np.exp(v[:-1]), strict=True))
         normal, _, own = sums.solve(sigma, float(np.exp(v[-1])), correlation[2])
         full = normal + prior
-        factor = cholesky(full[:-1, :-1], lower=True, check_finite=False)
+        try:
+            factor = cholesky(full[:-1, :-1], lower=True, check_finite=False)
+        except np.linalg.LinAlgError:
+            return IMPOSSIBLE  # so little noise that differences of large sums are all rounding
         part = solve_triangular(factor, full[:-1, -1], lower=True, check_finite=False)
         return float(own + 3.0 * correlation[3] + 2.0 * np.log(np.diag(factor)).sum() + full[-1, -1] - part @ part)
 
@@ -161,9 +168,13 @@ def fit_noise(sums: Sums, prior: Array, at: Stations, start: Noise, anew: bool =
             options=COARSE,
         )
         tried.append((float(found.fun), float(found.x), correlation))
-    _, pose, correlation = min(tried, key=lambda t: t[0])
+    best, pose, correlation = min(tried, key=lambda t: t[0])
     values = settle(np.r_[values[:-1], pose], correlation)
-    return _noise(kinds, values, correlation, at, start)
+    found = _noise(kinds, values, correlation, at, start)
+    others = [
+        (float(np.exp((best - c) / 2.0)), _noise(kinds, np.r_[values[:-1], p], k, at, start)) for c, p, k in tried
+    ]
+    return replace(found, rivals=tuple((w, n) for w, n in others if w > UNLIKELY))
 
 
 def _noise(kinds: list[str], values: Array, correlation: Correlation, at: Stations, start: Noise) -> Noise:

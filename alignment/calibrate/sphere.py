@@ -9,6 +9,7 @@ from scipy.linalg import cho_factor, cho_solve
 from alignment.calibrate.pose_noise import Noise, Rows, Stations, Sums, correlation_inverse, fit_noise, stations
 from alignment.calibrate.result import Calibration, Estimate, factor_95
 from alignment.calibrate.sphere_model import CENTRE, LEVEL, LOSS, RADIUS, SLOPE, TCP, UNKNOWNS, Seen, SphereViews, see
+from alignment.calibrate.sphere_search import on_sphere
 from alignment.calibrate.sphere_views import MIN_READINGS, first_look, sphere_views
 from alignment.calibrate.tcp_result import PRIOR, split_held, tcp_estimates, tcp_patch
 from alignment.scan import Scan
@@ -44,8 +45,8 @@ def calibrate_tcp_sphere(scan: Scan, setup: Setup, radius_mm: float | None = Non
     that fades over a length found from the data. A direction whose posterior sigma stays above half of the prior (1.5 deg,
     2 mm) is held. Raises EchoBaseError `tcp-readings`.
     """
-    views = sphere_views(scan, setup)
-    fit = _Fit(views, radius_mm, scan.name)
+    views, about = on_sphere(sphere_views(scan, setup), radius_mm, scan.name)
+    fit = _Fit(views, radius_mm, about, scan.name)
     covariance = fit.solve(np.eye(6))
     kept, held = split_held(covariance[TCP, TCP])
     if kept.shape[1] == 0:
@@ -82,6 +83,7 @@ class _Fit:
 
     views: SphereViews
     radius_mm: float | None
+    about: tuple[float, Array]
     name: str
 
     def __post_init__(self) -> None:
@@ -90,7 +92,7 @@ class _Fit:
         self.prior_sigma[RADIUS] = RADIUS_SIGMA_MM if known else NO_RADIUS_SIGMA_MM
         self.prior_sigma[SLOPE], self.prior_sigma[LOSS], self.prior_sigma[TCP] = SLOPE_SIGMA_DB_MM, LOSS_SIGMA, PRIOR
         self.at_mm = float(np.median(views.distance_mm))
-        self.believed = first_look(views, self.radius_mm, self.prior_sigma, self.at_mm)
+        self.believed = first_look(views, self.about, self.prior_sigma, self.at_mm)
         self.unknown = self.believed.copy()
         self.believed[LOSS], self.believed[SLOPE], self.believed[TCP] = 0.0, 0.0, 0.0
         if known:
@@ -142,14 +144,28 @@ class _Fit:
             sums = Sums(used, len(self.at))
             if round_ in rounds:
                 self.noise = fit_noise(sums, prior, self.at, self.noise, anew=round_ == rounds[-1])
-            sigma = {"distance": self.noise.distance_mm, "level": self.noise.level_db}
-            normal, errors, _ = sums.solve(sigma, self.noise.pose_mm, correlation_inverse(self.at, self.noise))
-            factor = cho_factor((normal + prior)[:-1, :-1])
-            step = cho_solve(factor, (normal + prior)[:-1, -1])
-            covariance = cho_solve(factor, np.eye(len(step)))
+            step, covariance, errors = self._step(sums, prior, self.noise)
+            if round_ == ROUNDS - 1:
+                covariance = self._mixed(sums, prior, step)
             self.unknown = self.unknown + basis @ step
             self._choose(seen, rows, step, errors)
         return np.asarray(basis @ covariance @ basis.T)
+
+    def _step(self, sums: Sums, prior: Array, noise: Noise) -> tuple[Array, Array, Array]:
+        """Return the step (p,), its covariance (p, p) and the stations' errors per column (3 s, p + 1)."""
+        sigma = {"distance": noise.distance_mm, "level": noise.level_db}
+        normal, errors, _ = sums.solve(sigma, noise.pose_mm, correlation_inverse(self.at, noise))
+        factor = cho_factor((normal + prior)[:-1, :-1])
+        return cho_solve(factor, (normal + prior)[:-1, -1]), cho_solve(factor, np.eye(len(normal) - 1)), errors
+
+    def _mixed(self, sums: Sums, prior: Array, step: Array) -> Array:
+        """Return the covariance (p, p) about a step, over what the noise may be: how it is correlated is a guess, too."""
+        total, weights = np.zeros((len(step), len(step))), 0.0
+        for weight, noise in self.noise.rivals:
+            other, covariance, _ = self._step(sums, prior, noise)
+            total += weight * (covariance + np.outer(other - step, other - step))
+            weights += weight
+        return total / weights
 
     def _rows(self, seen: Seen, basis: Array) -> dict[str, Rows]:
         """By kind: station, derivatives by the pose's error, derivatives by the unknown beside the residual."""

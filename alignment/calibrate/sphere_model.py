@@ -85,7 +85,8 @@ def see(views: SphereViews, unknown: Array, distance_at_mm: float) -> Seen:
     level = unknown[LEVEL] + unknown[SLOPE] * (distance - distance_at_mm)
     d_level = unknown[SLOPE] * d_distance
     d_level[:, LEVEL], d_level[:, SLOPE] = 1.0, distance - distance_at_mm
-    losses = np.array([views.loss_b, views.loss_c]) * np.exp(unknown[LOSS])
+    # A step of a search may ask for any loss; e^5 times the setup's is none that a probe has.
+    losses = np.array([views.loss_b, views.loss_c]) * np.exp(np.clip(unknown[LOSS], -5.0, 5.0))
     loss = np.zeros(n)
     for i, k in enumerate(losses):
         axis = axes[:, i]

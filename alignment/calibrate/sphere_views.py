@@ -1,5 +1,7 @@
 """Readings of a fixed sphere as `SphereViews`, and a first, robust look at where it is."""
 
+from collections.abc import Callable
+
 import numpy as np
 from numpy.typing import NDArray
 from scipy.optimize import least_squares
@@ -51,22 +53,22 @@ def sphere_views(scan: Scan, setup: Setup) -> SphereViews:
     )
 
 
-def first_look(views: SphereViews, radius_mm: float | None, prior_sigma: Array, at_mm: float) -> Array:
+def first_look(views: SphereViews, about: tuple[float, Array], prior_sigma: Array, at_mm: float) -> Array:
     """Return an unknown (14,) near the truth, outliers notwithstanding: from distances, then with levels too.
 
-    prior_sigma (14,): what is believed of the unknown beforehand, about its start; infinite for nothing. at_mm: distance
-    to which the level belongs.
+    about: radius and centre, roughly. prior_sigma (14,): what is believed of the unknown beforehand, about its start;
+    infinite for nothing. at_mm: distance to which the level belongs.
     """
-    rotation, beam = views.rotation[views.pose], views.rotation[views.pose, :, 2]
-    face = views.origin_base[views.pose] + np.einsum("nij,nj->ni", rotation, views.law_tcp)
-    surface = face + views.distance_mm[:, None] * beam
     start = np.zeros(UNKNOWNS)
-    start[RADIUS] = radius_mm if radius_mm is not None else _radius(surface, beam)
-    start[CENTRE] = np.median(surface + start[RADIUS] * beam, axis=0)
+    start[RADIUS], start[CENTRE] = about
     look = views.subset(np.unique(np.linspace(0, len(views) - 1, FIRST_LOOK).astype(np.int64)))
     free = np.zeros(UNKNOWNS, dtype=bool)
     free[CENTRE] = free[RADIUS] = free[TCP] = True
-    found, _ = _robust(look, start, start, free, prior_sigma, at_mm)
+    found, _ = _robust(look, start, start, free, prior_sigma, at_mm, _soft)
+    found, _ = _robust(look, start, found, free, prior_sigma, at_mm, _redescending)
+    off = np.abs(look.distance_mm - see(look, found, at_mm).distance_mm)
+    # A false echo's level, where the sphere's would be faint, says much and all of it wrong.
+    look = look.subset(off < 4.0 * max(1.4826 * float(np.median(off)), FIRST_MM))
     heard = np.isfinite(look.level_db)
     if heard.sum() < MIN_READINGS:
         return found
@@ -76,14 +78,20 @@ def first_look(views: SphereViews, radius_mm: float | None, prior_sigma: Array, 
     for c_deg in FIRST_TILTS_DEG:
         tilted = found.copy()
         tilted[TCP.start] = np.radians(c_deg)
-        tries.append(_robust(look, start, tilted, np.ones(UNKNOWNS, dtype=bool), prior_sigma, at_mm))
+        tries.append(_robust(look, start, tilted, np.ones(UNKNOWNS, dtype=bool), prior_sigma, at_mm, _redescending))
     return min(tries, key=lambda t: t[1])[0]
 
 
 def _robust(
-    look: SphereViews, believed: Array, start: Array, free: NDArray[np.bool_], prior_sigma: Array, at_mm: float
+    look: SphereViews,
+    believed: Array,
+    start: Array,
+    free: NDArray[np.bool_],
+    prior_sigma: Array,
+    at_mm: float,
+    rho: Callable[[Array], Array],
 ) -> tuple[Array, float]:
-    """Return the unknown of least robust cost, and that cost; levels count if the level is free."""
+    """Return the unknown of least robust cost, and that cost; levels count if the level is free. Beliefs count in full."""
     strong = np.isfinite(look.level_db) & free[LEVEL]
     if strong.any():
         strong &= look.level_db > np.quantile(look.level_db[strong], 0.95) - STRONG_DB
@@ -105,22 +113,25 @@ def _robust(
         blocks = -seen.d_distance[:, free] / FIRST_MM, -seen.d_level[strong][:, free] / FIRST_DB, np.diag(weight)
         return np.vstack(blocks)
 
-    found = least_squares(rows, start[free], slopes, loss="soft_l1", x_scale="jac", max_nfev=40, ftol=1e-5)
+    def loss(z: Array) -> Array:
+        """Of squared rows: value, first and second derivative (3, n)."""
+        data = len(z) - int(free.sum())
+        plain = np.stack([z[data:], np.ones(len(z) - data), np.zeros(len(z) - data)])
+        return np.hstack([rho(z[:data]), plain])
+
+    found = least_squares(rows, start[free], slopes, loss=loss, x_scale="jac", max_nfev=40, ftol=1e-5)
     return spread(found.x), float(found.cost)
 
 
-def _radius(surface: Array, beam: Array) -> float:
-    """Return the radius (mm) at which the points surface + radius beam (n, 3) lie closest together, outliers dropped."""
-    keep = np.ones(len(surface), dtype=bool)
-    radius = 0.0
-    for _ in range(8):
-        s, b = surface[keep] - surface[keep].mean(axis=0), beam[keep] - beam[keep].mean(axis=0)
-        radius = -float((s * b).sum()) / max(float((b * b).sum()), 1e-12)
-        radius = float(np.clip(radius, 1.0, 500.0))
-        together = surface + radius * beam
-        off = np.linalg.norm(together - np.median(together, axis=0), axis=1)
-        keep = off <= 3.0 * np.median(off) + 1e-9
-    return radius
+def _soft(z: Array) -> Array:
+    root = np.sqrt(1.0 + z)
+    return np.stack([2.0 * (root - 1.0), 1.0 / root, -0.5 / root**3])
+
+
+def _redescending(z: Array) -> Array:
+    """Cauchy's: what is far off pulls less the farther it is."""
+    pull = 1.0 / (1.0 + z)
+    return np.stack([np.log1p(z), pull, -pull * pull])
 
 
 def _level_db(amplitude_pct: Array) -> Array:

@@ -8,9 +8,10 @@ from alignment.calibrate import calibrate_tcp_sphere
 from alignment.calibrate.sphere_model import UNKNOWNS, see
 from alignment.calibrate.sphere_views import sphere_views
 from alignment.scan import Scan
+from planner.couplant import tof_us
 from planner.errors import EchoBaseError
 from planner.setup import Pose, Probe, Setup, Tool
-from tests.calibrate.sphere_cell import record
+from tests.calibrate.sphere_cell import CENTRE, record
 from tests.calibrate.test_calibrate_tcp import tool_setup, true_tool
 
 TURN, SHIFT = np.array([0.4, -0.6, 0.8]), np.array([0.7, -0.9, 0.5])
@@ -100,6 +101,30 @@ def test_outliers_and_dropouts_do_not_matter() -> None:
     found = calibrate_tcp_sphere(scan, setup, 20.0)
     for axis, truth in truths(TURN, SHIFT).items():
         assert abs(found.estimates[axis].value - truth) <= 1.5 * found.estimates[axis].half_95
+
+
+@pytest.mark.parametrize("radius", [20.0, None])
+def test_most_echoes_may_come_from_what_the_sphere_stands_on(radius: float | None) -> None:
+    setup = tool_setup()
+    rng = np.random.default_rng(11)
+    scan = record(setup, TURN, SHIFT, rng)
+    # Laws that do not see the ball look at a table 55 mm below its middle, from straight above only, and at bubbles.
+    lost = np.isnan(scan.tof_us)
+    beam = true_tool(setup, TURN, SHIFT).rotation_matrix[:, 2]
+    taught = setup.tool.tcp.transform("flange", "tcp")
+    flange = scan.Ts_scan_tcp.rotation_matrix @ taught.rotation_matrix.T
+    down = (flange @ beam)[scan.pose_index] @ [0.0, 0.0, -1.0]
+    table = scan.Ts_scan_tcp.xyz_mm[scan.pose_index][:, 2] - (CENTRE[2] - 55.0)
+    above = lost & (down > np.cos(np.radians(4.0)))
+    scan.tof_us[above] = tof_us(table[above], setup.couplant)
+    bubbles = lost & ~above & (rng.random(len(scan)) < 0.1)
+    scan.tof_us[bubbles] = rng.uniform(2.0, 60.0, bubbles.sum())
+    scan.amplitude_pct[above | bubbles] = 45.0 * rng.uniform(0.8, 1.2, (above | bubbles).sum())
+    assert (above | bubbles).sum() > 1.5 * (~lost).sum()
+    found = calibrate_tcp_sphere(scan, setup, radius).estimates
+    for axis, truth in truths(TURN, SHIFT).items():
+        assert abs(found[axis].value - truth) <= 1.5 * found[axis].half_95, axis
+    assert abs(found["radius"].value - 20.0) <= 1.5 * found["radius"].half_95
 
 
 def test_a_single_crystal_is_an_array_of_one() -> None:
