@@ -3,7 +3,7 @@
 import io
 import json
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from importlib.metadata import version
 from pathlib import Path
 from typing import Any, Literal
@@ -19,7 +19,7 @@ from app.report.build import Deviation, ReportData, alignment_report
 from app.report.known import ScanFacts
 from app.report.pictures import Shape
 from app.report.record import Record
-from app.steps.corrections import last_correction
+from app.steps.corrections import base_issues, last_correction, replaced
 from app.steps.non_rigid import Followed, follow
 from app.steps.programs import ExportedProgram, export_path, findings, program_name
 from app.steps.records import record_of
@@ -44,6 +44,8 @@ class AlignOptions:
     last_correction: Transform | None = None
     record: Record | None = None
     """What people know of the inspection; None: `record.json` of the folder, if there is one."""
+    earlier: dict[str, Any] | None = None
+    """correction.json as it stood in the folder, for `replaces` and for scans that cannot say their BASE; else None."""
 
     @classmethod
     def from_folder(
@@ -54,9 +56,10 @@ class AlignOptions:
         non_rigid: bool = False,
         base: Literal["nominal", "corrected"] | None = None,
         record: Record | None = None,
+        earlier: dict[str, Any] | None = None,
     ) -> "AlignOptions":
         """Return options that remember the folder's last correction, since `align` replaces it."""
-        return cls(method, edges, non_rigid, base, last_correction(folder), record)
+        return cls(method, edges, non_rigid, base, last_correction(folder), record, earlier)
 
 
 @dataclass(frozen=True, eq=False)
@@ -78,6 +81,7 @@ class Prepared:
     record: Record
     read: list[Scan | SurfacePoints]
     cloud: PointCloud
+    earlier: dict[str, Any] | None = None
 
 
 def prepare(folder: Path, scans: Sequence[Path], options: AlignOptions) -> Prepared:
@@ -86,7 +90,9 @@ def prepare(folder: Path, scans: Sequence[Path], options: AlignOptions) -> Prepa
     read = read_scans(scans)
     last = options.last_correction
     corrected = None if last is None else corrected_base(plan.setup.T_world_base, last)
-    return Prepared(plan, record, read, cloud_of(read, plan.setup, options.base, corrected))
+    cloud = cloud_of(read, plan.setup, options.base, corrected)
+    cloud = replace(cloud, issues=(*cloud.issues, *base_issues(options.earlier, read, options.base)))
+    return Prepared(plan, record, read, cloud, options.earlier)
 
 
 def run_align(folder: Path, scans: Sequence[Path], options: AlignOptions, progress: Progress) -> Alignment:
@@ -124,6 +130,7 @@ def complete(
         "plan_sha256": plan.sha256,
         "version": version("echobase"),
     }
+    content["replaces"] = replaced(given.earlier, content["correction"])
     if together:
         content["inputs"]["together"] = list(together)
     program = None

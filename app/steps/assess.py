@@ -2,7 +2,7 @@
 
 import json
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any, Literal
 
@@ -11,7 +11,7 @@ from app.plan import Artifacts, Plan, load_plan
 from app.report.assessment import AssessmentData, assessment_report
 from app.report.known import ScanFacts
 from app.report.record import Record
-from app.steps.corrections import last_correction
+from app.steps.corrections import base_issues, last_correction
 from app.steps.records import record_of
 from app.steps.scans import cloud_of, read_scans
 from planner.frames import Transform
@@ -33,6 +33,8 @@ class AssessOptions:
     base: BaseName | None = None
     before_base: BaseName | None = None
     record: Record | None = None
+    earlier: dict[str, Any] | None = None
+    """correction.json as it stands in the folder, for scans that cannot say their BASE; None: not by folder."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -55,11 +57,11 @@ def run_assess(folder: Path, scans: Sequence[Path], options: AssessOptions, prog
     plan, record = load_plan(folder), record_of(folder, options.record)
     found = last_correction(folder)
     progress(0.15, "reading and judging the scan")
-    after, facts = _judge(plan, found, scans, options.base, "scan")
+    after, facts = _judge(plan, found, scans, options.base, "scan", options.earlier)
     earlier = None
     if options.before:
         progress(0.45, "reading and judging the scan from before")
-        earlier, more = _judge(plan, found, options.before, options.before_base, "before")
+        earlier, more = _judge(plan, found, options.before, options.before_base, "before", options.earlier)
         facts = [*more, *facts]
     content = compare(after.figures, None if earlier is None else earlier.figures)
     text = json.dumps(content, indent=1, allow_nan=False) + "\n"
@@ -77,11 +79,17 @@ def run_assess(folder: Path, scans: Sequence[Path], options: AssessOptions, prog
 
 
 def _judge(
-    plan: Plan, found: Transform | None, scans: Sequence[Path], base: BaseName | None, role: str
+    plan: Plan,
+    found: Transform | None,
+    scans: Sequence[Path],
+    base: BaseName | None,
+    role: str,
+    earlier: dict[str, Any] | None,
 ) -> tuple[Assessment, list[ScanFacts]]:
     nominal = assume_nominal(plan.setup.T_base_partnom)
     T_base_part = nominal if found is None else part_from_correction(found, plan.setup.T_base_partnom)
     T_world_corrected = None if found is None else corrected_base(plan.setup.T_world_base, found)
     read = read_scans(scans)
     cloud = cloud_of(read, plan.setup, base, T_world_corrected)
+    cloud = replace(cloud, issues=(*cloud.issues, *base_issues(earlier, read, base)))
     return assess(cloud, plan.curved, plan.setup, T_base_part), [ScanFacts.of(s, role) for s in read]

@@ -7,6 +7,7 @@ from typing import Any
 from app import workflow
 from app.cli.run import DONE, FAILED, progress_printer, say, say_issues
 from app.folder import clear_programs, write_artifacts
+from app.steps.corrections import earlier_in
 from app.steps.records import read_record
 from planner.errors import fail
 
@@ -22,7 +23,13 @@ def run(args: argparse.Namespace) -> tuple[dict[str, Any], int]:
     record = None if args.record is None else read_record(args.record)
     options = [
         workflow.AlignOptions.from_folder(
-            folder, method=args.method, edges=args.edges, non_rigid=args.non_rigid, base=args.base, record=record
+            folder,
+            method=args.method,
+            edges=args.edges,
+            non_rigid=args.non_rigid,
+            base=args.base,
+            record=record,
+            earlier=earlier_in(folder),
         )
         for folder, _ in plans
     ]

@@ -6,6 +6,7 @@ from typing import Any
 from app import workflow
 from app.cli.run import DONE, progress_printer, say, say_issues
 from app.folder import clear_programs, write_artifacts
+from app.steps.corrections import earlier_in
 from app.steps.records import read_record
 from planner.errors import fail
 
@@ -16,7 +17,9 @@ def run(args: argparse.Namespace) -> tuple[dict[str, Any], int]:
         if not scan.is_file():
             raise fail("file-missing", f"there is no file '{scan.name}'.", "Check the path.", str(scan))
     record = None if args.record is None else read_record(args.record)
-    options = workflow.AssessOptions(tuple(args.before), args.base, args.before_base, record)
+    options = workflow.AssessOptions(
+        tuple(args.before), args.base, args.before_base, record, earlier_in(args.directory)
+    )
     clear_programs(args.directory, "assessment")
     result = workflow.assess(args.directory, args.scans, options, progress_printer(args))
     write_artifacts(args.directory, result.artifacts)
