@@ -136,7 +136,7 @@ def batch(parts: Sequence[PartEvidence], face_axes: Array | None = None) -> Batc
     T = moved(place, np.r_[xi[:3], np.zeros(3)], centre)
     T = moved(T, np.r_[np.zeros(3), xi[3:]], centre)
     names = tuple(p.name for p in parts)
-    issues = tuple(_say(names, axes, values, found, odd))
+    issues = tuple(_say(names, axes, values, sigma, odd))
     return Batch(
         names, frame, frame_axes, axes, values, sigma, departure, z, tuple(found), odd, T, centre, prior, issues
     )
@@ -148,22 +148,23 @@ def _scaled(c: Common, k: float) -> Common:
     return Common(k * c.mean, k * c.half_95, scatter, interval, ahead, c.odd)
 
 
-def _say(
-    names: tuple[str, ...], axes: tuple[BatchAxis, ...], values: Array, found: Sequence[Common], odd: Array
-) -> list[Issue]:
+def _say(names: tuple[str, ...], axes: tuple[BatchAxis, ...], values: Array, sigma: Array, odd: Array) -> list[Issue]:
     issues = []
     k = len(names)
     for i, j in zip(*np.nonzero(odd), strict=True):
         others = np.isfinite(values[:, j]) & (np.arange(k) != i)
-        rest = common_without(values[others, j])
-        off, axis = float(values[i, j] - rest), axes[j]
+        rest, axis = common(values[others, j], sigma[others, j] ** 2), axes[j]
+        off = float(values[i, j] - rest.mean)
         digits = 2 if axis.unit == "mm" else 3
+        without = (
+            f"common {rest.mean:+.{digits}f} +-{rest.half_95:.{digits}f} {axis.unit}, scatter {rest.scatter:.{digits}f}"
+        )
         issues.append(
             Issue(
                 "warning",
                 "batch-outlier",
                 f"{names[i]} {_stands(axis, off, digits)} than the other {int(others.sum())}.",
-                "Look at how it sat in the fixture; leave it out to see the batch without it.",
+                f"Look at how it sat in the fixture, and leave it out; without it: {without} {axis.unit}.",
                 names[i],
             )
         )
@@ -192,11 +193,6 @@ def _say(
             )
         )
     return issues
-
-
-def common_without(values: Array) -> float:
-    """Return the middle of the others."""
-    return float(np.median(values))
 
 
 def _stands(axis: BatchAxis, off: float, digits: int) -> str:

@@ -79,7 +79,7 @@ def _common(found: Batch) -> Table:
         seen = int(np.isfinite(found.values[:, j]).sum())
         label = f"{axis.name}: {axis.text} ({axis.unit})"
         rows.append((label, whole(seen), number(c.mean, d, True), number(c.half_95, d), number(c.scatter, d), between))
-    titles = ("parts", "common", "+- 95 %", "scatter", "scatter, 95 %")
+    titles = ("parts", "common", "\N{PLUS-MINUS SIGN} 95 %", "scatter", "scatter, 95 %")
     columns = (Column(title="direction", look="text", share=1.6), *(Column(title=t) for t in titles))
     return Table(name="directions", columns=columns, rows=tuple(rows))
 
