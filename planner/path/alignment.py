@@ -32,6 +32,7 @@ from planner.surface.curved import CurvedSurface
 from planner.surface.keepouts import keep_outs_of
 from planner.toolpath import ToolPath
 
+MOST_POSES = 1_000_000
 _RIM_SPACING_MM = 5.0
 # How far inside a crossing of its own begins: long enough to settle, short enough not to fill a small part.
 _CROSSING_SHARE, _CROSSING_MM = 0.08, (8.0, 20.0)
@@ -66,10 +67,11 @@ def passes_through(curved: CurvedSurface, keypoints: tuple[KeyPoint, ...], setup
     runs: list[Run] = []
     for members in strokes_through(keypoints, foot.points):
         strokes = _lines(curved, mesh, on_mesh[members], foot.normals[members], axes)
-        runs += [piece for stroke in strokes for piece in outside(mesh, finished(mesh, stroke, edges, setup), keep)]
+        runs += [finished(mesh, stroke, edges, setup) for stroke in strokes]
+    runs = outside(mesh, runs, keep)
     if setup.alignment.edges:
         extra = _crossings(curved, mesh, runs, edges, axes, setup)
-        runs += [piece for run in extra for piece in outside(mesh, run, keep) if piece.over]
+        runs += [piece for piece in outside(mesh, extra, keep) if piece.over]
     if not runs:
         raise fail(
             "alignment-kept-out",
@@ -77,7 +79,20 @@ def passes_through(curved: CurvedSurface, keypoints: tuple[KeyPoint, ...], setup
             "Pick key points away from them, or correct inspection.keep_outs.",
             "keypoints",
         )
+    expect_sensible(sum(run.s1 - run.s0 for run in runs), setup)
     return _path(curved, mesh, runs, setup)
+
+
+def expect_sensible(length_mm: float, setup: Setup) -> None:
+    """Raise EchoBaseError `alignment-too-long` for data passes so long that no robot would run them."""
+    poses = length_mm / acquisition_spacing_mm(setup)
+    if poses > MOST_POSES:
+        raise fail(
+            "alignment-too-long",
+            f"The alignment scan would be {length_mm / 1e6:.1f} km long.",
+            "Ask for less alignment.coverage, take a probe with a wider swath, or inspect a smaller surface.",
+            "setup.json: alignment.coverage",
+        )
 
 
 def _lines(curved: CurvedSurface, mesh: PathMesh, points: Array, normals: Array, axes: ScanAxes) -> list[Stroke]:

@@ -11,7 +11,7 @@ from planner.path.fence import Fence
 from planner.path.isolines import Chains, Ints
 from planner.path.mesh import PathMesh
 from planner.path.passes import DataRuns, contact_frames, extrapolate
-from planner.path.section import Stroke, positions
+from planner.path.section import Stroke, positions, together
 from planner.path.tracks import measure, within
 from planner.setup import Setup
 from planner.surface.keepouts import KeepOuts
@@ -63,20 +63,24 @@ def finished(mesh: PathMesh, stroke: Stroke, rim: Rim, setup: Setup, only_last: 
     return Run(line, s0, s1, tuple(over), ends)
 
 
-def outside(mesh: PathMesh, run: Run, keep: KeepOuts) -> list[Run]:
-    """Return what of a pass lies outside the keep-out regions, in pieces long enough to be worth one."""
-    if not len(keep) or run.s1 <= run.s0:
-        return [run]
+def outside(mesh: PathMesh, runs: list[Run], keep: KeepOuts) -> list[Run]:
+    """Return what of passes lies outside the keep-out regions, in pieces long enough to be worth one, in order."""
+    if not len(keep):
+        return runs
+    out: list[Run] = [r for r in runs if r.s1 <= r.s0]
+    some = [r for r in runs if r.s1 > r.s0]
+    if not some:
+        return out
     fence = Fence(mesh, 0.0, keep=keep)
     spacing = min(_LEAST_PIECE_MM, fence.finest_mm) / 2.0
-    zero = np.zeros(1, dtype=np.int64)
-    lengths = measure(mesh, run.line)
-    _, low, high, _ = within(lengths, zero, np.array([run.s0]), np.array([run.s1]), spacing, fence)
-    out = []
-    for s0, s1 in zip(low.tolist(), high.tolist(), strict=True):
-        over = tuple(end for end in run.over if (s0 <= run.s0 + 1e-6 if end == 0 else s1 >= run.s1 - 1e-6))
-        if s1 - s0 >= _LEAST_PIECE_MM:
-            out.append(Run(run.line, s0, s1, over, run.ends))
+    lengths = measure(mesh, together([Stroke(r.line, r.s0, r.s1, 0.0) for r in some]))
+    s0, s1 = np.array([r.s0 for r in some]), np.array([r.s1 for r in some])
+    which, low, high, _ = within(lengths, np.arange(len(some)), s0, s1, spacing, fence)
+    for k, a, b in zip(which.tolist(), low.tolist(), high.tolist(), strict=True):
+        run = some[k]
+        over = tuple(end for end in run.over if (a <= run.s0 + 1e-6 if end == 0 else b >= run.s1 - 1e-6))
+        if b - a >= _LEAST_PIECE_MM:
+            out.append(Run(run.line, a, b, over, run.ends))
     return out
 
 

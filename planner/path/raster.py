@@ -57,8 +57,10 @@ def raster(curved: CurvedSurface, setup: Setup) -> ToolPath:
             "raster-empty",
             f"No pass fits on the surface with {inspection.edge_margin_mm:g} mm kept from its edges"
             + (" and the keep-out regions left out." if inspection.keep_outs else "."),
-            "Give a smaller inspection.edge_margin_mm, or choose a larger surface.",
-            "setup.json: inspection.edge_margin_mm",
+            "Give smaller keep-outs or margins, let the tool cross them (may_cross), or a smaller edge_margin_mm."
+            if inspection.keep_outs
+            else "Give a smaller inspection.edge_margin_mm, or choose a larger surface.",
+            "setup.json: inspection" if inspection.keep_outs else "setup.json: inspection.edge_margin_mm",
         )
     if not cut.exact:
         track = split_at_turns(track, _sharp(track, cut.mesh.face_normals, spacing))

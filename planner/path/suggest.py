@@ -7,7 +7,7 @@ import numpy as np
 from planner.errors import fail
 from planner.frames import Array
 from planner.keypoint import KeyPoint
-from planner.path.alignment import passes_through
+from planner.path.alignment import expect_sensible, passes_through
 from planner.path.axes import ScanAxes, raster_axes
 from planner.path.coverage import swept_share
 from planner.path.crossings import PATCH_MM, PATCH_SIGMA_MM, prior_precision, rows
@@ -53,6 +53,7 @@ def suggest(curved: CurvedSurface, setup: Setup, seed: int = 0) -> tuple[KeyPoin
     axes = raster_axes(curved, setup)
     asked = setup.alignment.coverage
     length = asked * curved.surface.area_mm2 / setup.probe.swath_mm
+    expect_sensible(length, setup)
     shift = float(np.random.default_rng(seed).uniform(-0.2, 0.2)) if seed else 0.0
     ranked = []
     for share in _SHARES:

@@ -27,6 +27,8 @@ _LEAST_DEPTH_MM = 5.0
 # On triangles given by number: nearer than this beside them (mm, and as a share of the height over them) is on them.
 _ON_MM, _OVER = 1e-6, 0.1
 _FAR_MM = 50.0
+# Points worked on at a time.
+_ROWS = 4096
 
 
 @dataclass(frozen=True, eq=False)
@@ -83,7 +85,15 @@ class KeepOuts:
 
     def gaps_mm(self, points: Array) -> Array:
         """Return the distance (k, n), mm, of points (n, 3) on the surface from each region, negative inside."""
-        return np.stack([self._gap(i, points) for i in range(len(self))]) if len(self) else np.zeros((0, len(points)))
+        out = np.zeros((len(self), len(points)))
+        round_ = [i for i, s in enumerate(self.shapes) if isinstance(s, SphereKeepOut | DiscKeepOut)]
+        for start in range(0, len(points), _ROWS):
+            rows = slice(start, start + _ROWS)
+            out[round_, rows] = self._round_gaps(round_, points[rows])
+        for i, shape in enumerate(self.shapes):
+            if not isinstance(shape, SphereKeepOut | DiscKeepOut):
+                out[i] = self._gap(i, points)
+        return out
 
     def inside(self, points: Array) -> NDArray[np.bool_]:
         """Return which points (n, 3) of the surface lie in a region (n,)."""
@@ -124,23 +134,36 @@ class KeepOuts:
         """Return what to call a region."""
         return self.shapes[index].name or f"keep-out {index + 1}"
 
+    def _round_gaps(self, index: list[int], points: Array) -> Array:
+        """Return the distances (k, n) of points from spheres and discs, all at once: there may be hundreds."""
+        shapes = [s for i in index if isinstance(s := self.shapes[i], SphereKeepOut | DiscKeepOut)]
+        centre = np.array([s.centre_mm for s in shapes]).reshape(-1, 3)
+        radius = np.array([s.radius_mm for s in shapes])[:, None]
+        d = points[None] - centre[:, None]
+        away2 = np.einsum("knj,knj->kn", d, d)
+        out = np.asarray(np.sqrt(away2) - radius)
+        disc = np.array([isinstance(s, DiscKeepOut) for s in shapes], dtype=bool)
+        if disc.any():
+            height = np.einsum("knj,kj->kn", d[disc], self.up[index][disc])
+            side = np.sqrt(np.maximum(away2[disc] - height**2, 0.0)) - radius[disc]
+            out[disc] = _prism(side, np.abs(height) - np.maximum(radius[disc], _LEAST_DEPTH_MM))
+        return out
+
     def _gap(self, index: int, points: Array) -> Array:
         shape, up = self.shapes[index], self.up[index]
-        if isinstance(shape, SphereKeepOut):
-            return np.asarray(np.linalg.norm(points - shape.centre_mm, axis=1) - shape.radius_mm)
         if isinstance(shape, BoxKeepOut):
             low, high = np.array(shape.min_mm), np.array(shape.max_mm)
             over = np.maximum(low - points, points - high)
             return np.asarray(np.linalg.norm(np.maximum(over, 0.0), axis=1) + np.minimum(over.max(axis=1), 0.0))
-        if isinstance(shape, DiscKeepOut):
-            d = points - shape.centre_mm
-            height = d @ up
-            side = np.sqrt(np.maximum(np.einsum("ij,ij->i", d, d) - height**2, 0.0)) - shape.radius_mm
-            return _prism(side, np.abs(height) - max(shape.radius_mm, _LEAST_DEPTH_MM))
         if isinstance(shape, PolygonKeepOut):
             corners = np.array(shape.points_mm)
             d, frame = points - corners.mean(axis=0), np.stack(_frame(up), axis=1)
-            side = signed_distance_mm(d @ frame, (corners - corners.mean(axis=0)) @ frame)
+            flat, outline = d @ frame, (corners - corners.mean(axis=0)) @ frame
+            # From afar the distance of the bounds will do: it is never more.
+            low, high = outline.min(axis=0), outline.max(axis=0)
+            side = np.linalg.norm(np.maximum(np.maximum(low - flat, flat - high), 0.0), axis=1)
+            near = side < 2.0 * (shape.margin_mm + self.nozzle_mm) + _FAR_MM
+            side[near] = signed_distance_mm(flat[near], outline)
             return _prism(side, np.abs(d @ up) - shape.depth_mm)
         vertices, faces, tree = self._tree(index)
         # From afar the distance of the bounds will do: it is never more.
@@ -234,9 +257,10 @@ def _up(surface: InspectionSurface, nearest: "_Nearest", shape: KeepOut, index: 
         return np.asarray(unit((part.face_areas_mm2[rows] @ part.face_normals[rows])[None])[0])
     if isinstance(shape, PolygonKeepOut):
         corners = np.array(shape.points_mm)
-        ahead = np.roll(corners, -1, axis=0)
-        normal = np.cross(corners - corners.mean(axis=0), ahead - corners.mean(axis=0)).sum(axis=0)
-        if not np.linalg.norm(normal) > 0.0:
+        # The plane that fits them best: a polygon may cross itself.
+        _, size, axes = np.linalg.svd(corners - corners.mean(axis=0), full_matrices=False)
+        normal = axes[2]
+        if not size[1] > 1e-6 * size[0]:
             raise fail(
                 "keep-out-flat", "The corners of a keep-out polygon lie on a line.", "Correct it.", _where(index)
             )

@@ -1,10 +1,13 @@
 """Keep-out regions: no data inside, nothing over a clamp, and the area said; against closed forms and sampled nozzles."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
 from benchmarks.planning.panels import double_slope, double_z, height_panel
 from planner.checks import check
+from planner.errors import EchoBaseError
 from planner.keypoint import KeyPoint
 from planner.path.alignment import alignment_path
 from planner.path.coverage import coverage
@@ -150,3 +153,32 @@ def test_segments_and_polygons_keep_the_distance_of_sampled_points():
     assert segment_distance_mm(start, end, polygon) == pytest.approx(sampled, abs=0.02)
     inside = signed_distance_mm(np.array([[5.0, 1.0], [5.0, 3.0]]), polygon)
     assert inside[0] < 0.0 < inside[1]
+
+
+def test_a_polygon_that_crosses_itself_or_has_a_thousand_corners_is_a_region():
+    """Two triangles that meet in a point, and a star: areas in closed form; distances by a tree as by brute force."""
+    surface = curved_of(plate(200.0, 120.0))
+    bow = [[-20.0, -20.0, 0.0], [20.0, 20.0, 0.0], [20.0, -20.0, 0.0], [-20.0, 20.0, 0.0]]
+    a = np.linspace(0.0, 2.0 * np.pi, 1000, endpoint=False)
+    r = 30.0 + 8.0 * np.sin(40.0 * a)
+    star = np.stack([r * np.cos(a), r * np.sin(a), 0.0 * a], axis=1)
+    for corners, area in ((bow, 800.0), (star.tolist(), np.pi * (30.0**2 + 8.0**2 / 2.0))):
+        setup = crystal(step_mm=20.0, keep_outs=[{"type": "polygon", "points_mm": corners, "margin_mm": 0.0}])
+        x, y = np.meshgrid(np.linspace(-60.03, 59.97, 481), np.linspace(-60.07, 59.93, 481))
+        points = np.stack([x.ravel(), y.ravel(), 0.0 * x.ravel()], axis=1)
+        inside = keep_outs_of(surface.surface, setup).inside(points)
+        assert inside.sum() * 0.25**2 == pytest.approx(area, rel=0.02)
+    far = np.random.default_rng(0).uniform(-60.0, 60.0, (4000, 2))
+    assert signed_distance_mm(far, star[:, :2]) == pytest.approx(
+        np.concatenate([signed_distance_mm(p, star[:, :2]) for p in np.array_split(far, 40)]), abs=1e-9
+    )
+    flat = crystal(step_mm=20.0, keep_outs=[{"type": "polygon", "points_mm": [[-9, 0, 0], [0, 0, 0], [9, 0, 0]]}])
+    with pytest.raises(EchoBaseError, match="on a line"):
+        keep_outs_of(surface.surface, flat)
+
+
+def test_an_alignment_scan_of_kilometres_is_refused_with_a_remedy():
+    panel = plate(200.0, 120.0)
+    large = curved_of(replace(panel, vertices=panel.vertices * 100.0))
+    with pytest.raises(EchoBaseError, match="km long"):
+        suggest(large, crystal(step_mm=600.0))
