@@ -53,21 +53,21 @@ def run(panel: Panel, step_mm: float = 2.0) -> Iterator[Row]:
     """Plan one panel by both strategies and compare with the analytic surface; the curved surface is built once."""
     setup = setup_for(panel, "plane", step_mm)
     surface = panel.surface()
-    t0 = time.perf_counter()
+    t0 = time.process_time()
     curved = CurvedSurface(surface, footprint_mm(setup.probe))
-    seconds = time.perf_counter() - t0
+    seconds = time.process_time() - t0
     for strategy in ("plane", "geodesic"):
         yield _row(panel, curved, seconds, setup_for(panel, strategy, step_mm))
 
 
 def _row(panel: Panel, curved: CurvedSurface, surface_s: float, setup: Setup) -> Row:
-    t1 = time.perf_counter()
+    t1 = time.process_time()
     path = raster(curved, setup)
-    t2 = time.perf_counter()
+    t2 = time.process_time()
     covered = coverage(curved, path, setup)
-    t3 = time.perf_counter()
+    t3 = time.process_time()
     sparse = decimate(path)
-    t4 = time.perf_counter()
+    t4 = time.process_time()
     low, high = pitch(path)
     missed_inside = covered.missed_mm2 - covered.margin_mm2
     return Row(
@@ -127,9 +127,9 @@ def trimesh_seconds(panel: Panel, step_mm: float) -> tuple[float, float]:
     across = np.array([0.0, 1.0, 0.0])
     y = panel.vertices[:, 1]
     heights = np.arange(y.min() + step_mm / 2.0, y.max(), step_mm)
-    t0 = time.perf_counter()
+    t0 = time.process_time()
     mesh.section_multiplane(np.zeros(3), across, heights)
-    t1 = time.perf_counter()
+    t1 = time.process_time()
     faces = panel.faces.astype(np.int32)
     isolines(y.copy(), faces, neighbours(faces), heights)
-    return t1 - t0, time.perf_counter() - t1
+    return t1 - t0, time.process_time() - t1
