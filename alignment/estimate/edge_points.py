@@ -18,6 +18,8 @@ from planner.setup import Probe
 
 # Readings farther apart than this do not bracket an edge closely enough (mm).
 MOST_GAP_MM = 6.0
+# Tilt that takes more than this of the echo, or this much from one reading to the next (dB), cannot be given back well enough.
+MOST_LOSS_DB, MOST_STEP_DB = 10.0, 2.0
 # Around a reading, how far its plateau is looked for along the pass and across the laws (mm).
 PLATEAU_ALONG_MM, PLATEAU_ACROSS_MM = 12.0, 6.0
 
@@ -27,9 +29,10 @@ class EdgePoints:
     """k crossings between two readings each, one on the part and one off it.
 
     on_base, off_base (k, 3): where their laws stand, mm; share_on, share_off (k,): their amplitudes over the plateau.
-    window (k, 8): shares from three readings further on to three further off the part, NaN where there are none.
-    at (k,): place of the edge from on (0) to off (1). travel_base (k, 3): unit direction of travel. along (k,): True if
-    found along the pass, False if across the laws. pass_id, s_mm, law (k,).
+    window (k, 8): shares from three readings further on to three further off the part, NaN where there are none;
+    window_other (k, 8): the same if tilt takes of the echo what it may take as well. at, at_other (k,): place of the edge
+    from on (0) to off (1), by either. travel_base (k, 3): unit direction of travel. along (k,): True if found along the
+    pass, False if across the laws. pass_id, s_mm, law (k,).
     """
 
     on_base: Array
@@ -37,7 +40,9 @@ class EdgePoints:
     share_on: Array
     share_off: Array
     window: Array
+    window_other: Array
     at: Array
+    at_other: Array
     travel_base: Array
     along: NDArray[np.bool_]
     pass_id: NDArray[np.int32]
@@ -68,13 +73,19 @@ class EdgePoints:
         return (self.off_base - self.on_base) / np.where(gap > 0, gap, 1.0)[:, None]
 
 
-def edge_points(cloud: PointCloud, line: PoseLine, probe: Probe) -> EdgePoints:
-    """Return all crossings of a cloud that knows amplitudes; none otherwise."""
+def edge_points(cloud: PointCloud, line: PoseLine, probe: Probe, loss_db: Array, loss_other_db: Array) -> EdgePoints:
+    """Return all crossings of a cloud that knows amplitudes; none otherwise.
+
+    loss_db (m, laws): what tilt takes of the echo, given back before edges are looked for; where it takes too much, or too
+    steeply, nothing is said. loss_other_db (m, laws): what it may take as well.
+    """
     if cloud.beams_base is None or cloud.arrays_base is None or not np.isfinite(cloud.amplitude_pct).any():
         return _none()
-    share = _shares(cloud, line, probe)
+    share = _shares(cloud, line, probe, 10.0 ** (loss_db / 20.0))
     if share is None:
         return _none()
+    other = _shares(cloud, line, probe, 10.0 ** (loss_other_db / 20.0)) if loss_other_db.any() else share
+    assert other is not None
     x = law_offsets_mm(probe)
     step = np.abs(np.diff(line.s_mm))
     same = (np.diff(line.pass_id) == 0) & line.present[1:] & line.present[:-1] & (step < MOST_GAP_MM) & (step > 1e-6)
@@ -91,6 +102,8 @@ def edge_points(cloud: PointCloud, line: PoseLine, probe: Probe) -> EdgePoints:
         share[pose[:, 0], law[:, 0]],
         share[pose[:, 1], law[:, 1]],
         _windows(share, line, pose, law),
+        _windows(other, line, pose, law),
+        np.full(len(pose), 0.5),
         np.full(len(pose), 0.5),
         line.travel_base[pose[:, 0]],
         np.repeat([True, False], [len(i), len(j)]),
@@ -98,7 +111,9 @@ def edge_points(cloud: PointCloud, line: PoseLine, probe: Probe) -> EdgePoints:
         line.s_mm[pose].mean(axis=1),
         law.mean(axis=1),
     )
-    return found.take(_clear(found.window))
+    loss = _windows(loss_db, line, pose, law)
+    told = (np.nanmax(loss, axis=1) < MOST_LOSS_DB) & (np.nanmax(np.abs(np.diff(loss, axis=1)), axis=1) < MOST_STEP_DB)
+    return found.take(_clear(found.window) & told)
 
 
 def _clear(window: Array) -> NDArray[np.bool_]:
@@ -112,7 +127,7 @@ def _clear(window: Array) -> NDArray[np.bool_]:
     return stays & (known_on >= 3) & (known_off >= 2)
 
 
-def _shares(cloud: PointCloud, line: PoseLine, probe: Probe) -> Array | None:
+def _shares(cloud: PointCloud, line: PoseLine, probe: Probe, gain: Array) -> Array | None:
     """Return the amplitude of every pose and law over its plateau (m, laws): 0 where no echo came back."""
     m, laws = len(line.present), probe.laws
     amplitude = np.zeros((m, laws))
@@ -121,9 +136,10 @@ def _shares(cloud: PointCloud, line: PoseLine, probe: Probe) -> Array | None:
     amplitude[cloud.pose_index, cloud.law - 1] = value
     known[cloud.pose_index, cloud.law - 1] = np.isfinite(cloud.amplitude_pct)
     known[cloud.lost_pose_index, cloud.lost_law - 1] = True
-    usual = float(np.median(value[value > 0])) if (value > 0).any() else 0.0
-    if usual <= 0.0:
+    if not (value > 0).any():
         return None
+    amplitude *= gain
+    usual = float(np.median(amplitude[amplitude > 0]))
     spacing = max(line.spacing_mm, 1e-3)
     along = 2 * max(1, round(PLATEAU_ALONG_MM / spacing)) + 1
     across = 2 * max(1, round(PLATEAU_ACROSS_MM / probe.pitch_mm)) + 1 if laws > 1 else 1
@@ -181,4 +197,7 @@ def _windows(share: Array, line: PoseLine, pose: NDArray, law: NDArray) -> Array
 def _none() -> EdgePoints:
     z3, z = np.zeros((0, 3)), np.zeros(0)
     no, none = np.zeros(0, dtype=bool), np.zeros(0, dtype=np.int32)
-    return EdgePoints(z3, z3.copy(), z, z.copy(), np.zeros((0, 8)), z.copy(), z3.copy(), no, none, z.copy(), z.copy())
+    w = np.zeros((0, 8))
+    return EdgePoints(
+        z3, z3.copy(), z, z.copy(), w, w.copy(), z.copy(), z.copy(), z3.copy(), no, none, z.copy(), z.copy()
+    )

@@ -11,6 +11,7 @@ from alignment.estimate.capture import Captured, capture
 from alignment.estimate.cells import cells_along_passes, cells_in_space
 from alignment.estimate.directions import Direction, directions, held_basis
 from alignment.estimate.edge_curve import locate
+from alignment.estimate.edge_gain import tilt_loss_db
 from alignment.estimate.edge_points import edge_points
 from alignment.estimate.edge_rows import EdgeMap
 from alignment.estimate.locks import LockStrain, lock_strain
@@ -68,7 +69,7 @@ class MapFit:
 
 @dataclass(frozen=True, eq=False)
 class State:
-    """A placement, and the edges' bias and lag (2,) or nothing (0,), in their sigmas."""
+    """A placement, and the edges' bias, lag and tilt loss (3,) or nothing (0,), in their sigmas."""
 
     T_base_part: Transform
     nuisance: Array
@@ -88,7 +89,7 @@ def align_map(
         return captured
     line = None if cloud.beams_base is None else pose_line(cloud, setup.probe)
     patches = condense_cloud(cloud, problem, captured.T_base_part, line)
-    crossed = edge_data(cloud, problem, line) if edges else None
+    crossed = edge_data(cloud, problem, line, captured.T_base_part) if edges else None
     found = fit_captured(problem, captured, patches, crossed, stay_on_edges)
     if isinstance(found, MapFit) and not same_afresh(patches, curved, found.T_base_part, found.rows):
         # Feet that were followed over a fold: now every patch asks the whole surface at every step.
@@ -140,14 +141,16 @@ def fit_captured(
     )  # fmt: skip
 
 
-def edge_data(cloud: PointCloud, problem: Problem, line: PoseLine | None) -> EdgeData | None:
+def edge_data(cloud: PointCloud, problem: Problem, line: PoseLine | None, T_base_part: Transform) -> EdgeData | None:
     """Return the crossings of a cloud and the CAD edges they may belong to; None where there is nothing to match."""
     if line is None:
         return None
     probe = problem.setup.probe
     edges = EdgeMap(boundary(problem.curved.surface), probe.beam_width_mm)
-    points = edge_points(cloud, line, probe)
-    if len(edges) == 0 or len(points) == 0:
+    if len(edges) == 0:
+        return None
+    points = edge_points(cloud, line, probe, *tilt_loss_db(cloud, line, problem, T_base_part))
+    if len(points) == 0:
         return None
     points = locate(points, np.ones(len(points)), probe.beam_width_mm)
     return EdgeData(points, edges, np.zeros(len(points), dtype=bool), BIAS_SHARE * probe.beam_width_mm)

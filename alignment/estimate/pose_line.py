@@ -13,7 +13,8 @@ from planner.setup import Probe
 
 @dataclass(frozen=True, eq=False)
 class PoseLine:
-    """m poses in order of time. position_base (m, 3): middle of the array, mm. array_base (m, 3): its axis. pass_id (m,).
+    """m poses in order of time. position_base (m, 3): middle of the array, mm. array_base, beam_base (m, 3): its axis,
+    and where it fires. pass_id (m,).
 
     s_mm (m,): path length, straight across the gaps between passes. travel_base (m, 3): unit direction of travel, zero
     where the probe stood. present (m,): False for a pose without any reading, whose other rows mean nothing.
@@ -21,6 +22,7 @@ class PoseLine:
 
     position_base: Array
     array_base: Array
+    beam_base: Array
     pass_id: NDArray[np.int32]
     s_mm: Array
     travel_base: Array
@@ -39,7 +41,7 @@ def pose_line(cloud: PointCloud, probe: Probe) -> PoseLine:
     """Return the poses of an ultrasonic cloud."""
     offsets = law_offsets_mm(probe)
     m = 1 + max(int(cloud.pose_index.max(initial=-1)), int(cloud.lost_pose_index.max(initial=-1)))
-    position, array, pass_id = np.zeros((m, 3)), np.zeros((m, 3)), np.zeros(m, dtype=np.int32)
+    position, array, beam, pass_id = np.zeros((m, 3)), np.zeros((m, 3)), np.zeros((m, 3)), np.zeros(m, dtype=np.int32)
     present = np.zeros(m, dtype=bool)
     arrays = np.zeros((len(cloud), 3)) if cloud.arrays_base is None else cloud.arrays_base
     last = np.full(m, -1, dtype=np.int64)
@@ -48,18 +50,26 @@ def pose_line(cloud: PointCloud, probe: Probe) -> PoseLine:
     row = last[heard]
     array[heard] = arrays[row]
     position[heard] = cloud.origins_base[row] - offsets[cloud.law[row] - 1][:, None] * arrays[row]
+    if cloud.beams_base is not None:
+        beam[heard] = cloud.beams_base[row]
     pass_id[heard], present[heard] = cloud.pass_id[row], True
-    _add_silent_poses(cloud, offsets, position, array, pass_id, present)
+    _add_silent_poses(cloud, offsets, position, array, beam, pass_id, present)
     rows = np.flatnonzero(present)
     step = np.diff(position[rows], axis=0)
     length = np.linalg.norm(step, axis=1)
     s = np.zeros(m)
     s[rows] = np.concatenate([[0.0], np.cumsum(length)])[: len(rows)]
-    return PoseLine(position, array, pass_id, s, _travel(rows, step, pass_id, m), present)
+    return PoseLine(position, array, beam, pass_id, s, _travel(rows, step, pass_id, m), present)
 
 
 def _add_silent_poses(
-    cloud: PointCloud, offsets: Array, position: Array, array: Array, pass_id: NDArray, present: NDArray
+    cloud: PointCloud,
+    offsets: Array,
+    position: Array,
+    array: Array,
+    beam: Array,
+    pass_id: NDArray,
+    present: NDArray,
 ) -> None:
     """Fill in the poses that heard nothing, from two of their lost laws (the ends of the array)."""
     if not len(cloud.lost_pose_index):
@@ -76,7 +86,7 @@ def _add_silent_poses(
     along = np.divide(
         cloud.lost_origins_base[b] - cloud.lost_origins_base[a], span, out=np.zeros((len(a), 3)), where=span != 0
     )
-    array[silent] = along
+    array[silent], beam[silent] = along, cloud.lost_beams_base[a]
     position[silent] = cloud.lost_origins_base[a] - xa[:, None] * along
     pass_id[silent], present[silent] = cloud.lost_pass_id[a], True
 

@@ -77,7 +77,7 @@ def predict(path: ToolPath, curved: CurvedSurface, setup: Setup) -> Prediction:
     cloud = expected_cloud(path, curved, setup)
     line = pose_line(cloud, setup.probe)
     patches = condense_cloud(cloud, problem, T, line)
-    edges = _expected_edges(edge_data(cloud, problem, line), problem, T) if setup.alignment.edges else None
+    edges = _expected_edges(edge_data(cloud, problem, line, T), problem, T) if setup.alignment.edges else None
     system = System(problem, patches, np.ones(len(patches), dtype=bool), edges)
     used = system.surface(T).valid
     system = System(problem, patches, used, edges)

@@ -92,7 +92,7 @@ def _fitted(
     for scan, member in zip(scans, members, strict=True):
         line = None if scan.cloud.beams_base is None else pose_line(scan.cloud, scan.setup.probe)
         parts.append(condense_cloud(scan.cloud, scan.problem, member.placed(start), line))
-        crossed.append(edge_data(scan.cloud, scan.problem, line) if edges else None)
+        crossed.append(edge_data(scan.cloud, scan.problem, line, member.placed(start)) if edges else None)
     together = joined_edges(members, crossed)
     worst = replace(captured[0], scatter_mm=max(c.scatter_mm for c in captured))
     for strict in (False, True):

@@ -4,6 +4,7 @@ import numpy as np
 from scipy.special import ndtr
 
 from alignment.cloud import PointCloud
+from alignment.estimate.edge_gain import loss_of
 from alignment.estimate.edge_rows import EdgeMap
 from planner.errors import fail
 from planner.frames import Array
@@ -22,7 +23,8 @@ MOST_READINGS = 120_000
 def expected_cloud(path: ToolPath, curved: CurvedSurface, setup: Setup) -> PointCloud:
     """Return what the data poses of a path hear of the part on its nominal placement, without noise.
 
-    Beyond an edge the echo fades on the beam's S-curve; of dense paths some poses are left out.
+    Beyond an edge the echo fades on the beam's S-curve, and off the normal as the probe's tilt loss says; of dense paths
+    some poses are left out.
     """
     data = path.take(path.is_data)
     laws = setup.probe.laws
@@ -37,6 +39,10 @@ def expected_cloud(path: ToolPath, curved: CurvedSurface, setup: Setup) -> Point
     flat = origins.reshape(-1, 3)
     foot = curved.closest(flat)
     share = ndtr(-_beyond_mm(flat, foot.points, foot.normals, curved) / (setup.probe.beam_width_mm / 2.5))
+    n = foot.normals.reshape(m, laws, 3)
+    facing, b, c = (np.einsum("mki,mi->mk", n, sign * rotation[:, :, k]) for k, sign in ((2, -1), (0, 1), (1, 1)))
+    loss_db = loss_of(np.degrees(np.arctan2(b, facing)), np.degrees(np.arctan2(c, facing)), setup.probe)
+    share *= 10.0 ** (-loss_db.reshape(-1) / 20.0)
     heard = share > LEAST_SHARE
     pose = np.repeat(np.arange(m, dtype=np.int32), laws)
     law = np.tile(np.arange(1, laws + 1, dtype=np.int32), m)

@@ -19,10 +19,13 @@ MOST_EDGE_ROWS = 90
 LAWS_PER_ROW = 12.0
 COARSENINGS = 20
 # What the beam's asymmetry and the detection may shift every crossing by, as a share of the beam width, and what a late
-# clock may shift it by along the travel (mm). Both are estimated along; opposite edges and passes tell them apart.
+# clock may shift it by along the travel (mm); and tilt takes more or less of the echo at a curved rim than the set-up says. All
+# are estimated along; opposite edges, opposite passes and rims of different slope tell them apart.
 BIAS_SHARE = 0.04
 LAG_SIGMA_MM = 0.1
-NUISANCES = 2
+NUISANCES = 3
+# How far off what the set-up says of tilt at the rim may be, in differences between its two extremes.
+TILT_DOUBT = 2.0
 
 
 @dataclass(frozen=True, eq=False)
@@ -41,7 +44,7 @@ class EdgeData:
 
 @dataclass(frozen=True, eq=False)
 class System:
-    """Patches used (p,) and, perhaps, crossings of edges. Unknowns: six of the motion, then edge bias and lag."""
+    """Patches used (p,) and, perhaps, crossings of edges. Unknowns: six of the motion, then the edges' nuisances."""
 
     problem: Problem
     patches: Patches
@@ -60,7 +63,7 @@ class System:
 
     @property
     def unknowns(self) -> int:
-        """6, or 8 with edges."""
+        """6, or 9 with edges."""
         return 6 if self.edges is None else 6 + NUISANCES
 
     def surface(self, T_base_part: Transform) -> Rows:
@@ -69,7 +72,7 @@ class System:
         return patch_rows(self.patches, p.curved, T_base_part, p.centre_mm(T_base_part))
 
     def rows(self, T_base_part: Transform, nuisance: Array) -> NoiseRows:
-        """Return the condensed rows at a placement, with the edges' nuisances as they stand (2,), in their sigmas."""
+        """Return the condensed rows at a placement, with the edges' nuisances as they stand (3,), in their sigmas."""
         p = self.problem
         swath = p.setup.probe.swath_mm
         surface = noise_rows(self.patches, self.surface(T_base_part), self.used, p.prior_sigma, swath)
@@ -81,8 +84,10 @@ class System:
 
 
 def nuisance_columns(edges: EdgeData, found: EdgeRows) -> Array:
-    """Return how the residuals of crossings change with edge bias and lag (k, 2), per sigma of theirs."""
-    return np.column_stack([np.full(len(found.r), -edges.bias_sigma_mm), -LAG_SIGMA_MM * found.lag])
+    """Return how the residuals of crossings change with edge bias, lag and tilt loss (k, 3), per sigma of theirs."""
+    points = edges.points
+    tilted = TILT_DOUBT * (points.at - points.at_other) * points.gap_mm * found.cosine
+    return np.column_stack([np.full(len(found.r), -edges.bias_sigma_mm), -LAG_SIGMA_MM * found.lag, tilted])
 
 
 def _edge_row(edges: EdgeData, found: EdgeRows) -> NDArray[np.int64]:
