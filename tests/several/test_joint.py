@@ -98,7 +98,7 @@ def _other_base():
 
 @pytest.mark.slow
 @pytest.mark.parametrize(
-    ("names", "lines", "seeds"), [(("top", "side", "end"), INSIDE, 60), (("top", "side"), ACROSS, 30)]
+    ("names", "lines", "seeds"), [(("top", "side", "end"), INSIDE, 24), (("top", "side"), ACROSS, 12)]
 )
 def test_claimed_regions_hold_the_truth(names, lines, seeds):
     nominal = SETUP.T_base_partnom.renamed("base", "part")
