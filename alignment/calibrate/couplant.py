@@ -39,6 +39,7 @@ def calibrate_couplant(
     distance = np.asarray(gap_mm if gap_mm is not None else step_mm, dtype=np.float64)
     good = np.isfinite(tof) & np.isfinite(distance) & np.isfinite(number) & (number >= 1.0)
     tof, number, distance = tof[good], number[good], distance[good]
+    recorded = tof
     if len(tof) == 0:
         raise fail("couplant-readings", "There is no usable reading.", "Record times of flight over known gaps.")
     # Unknowns: slowness (us/mm), then delay, then (for steps) the unknown gap times the slowness.
@@ -85,7 +86,8 @@ def calibrate_couplant(
         if delay_status != "held":
             patch["delay_us"] = round(float(solution[1]), 5)
     rms = float(np.sqrt(np.mean(off**2)))
-    curves = {"distance_mm": distance, "echo": number, "residual_us": off}
+    moved = "gap_mm" if gap_mm is not None else "step_mm"
+    curves = {moved: distance, "echo": number, "expected_us": recorded - off, "residual_us": off}
     issues = tuple(_say(estimates, float(speed), known_delay))
     return Calibration("couplant", estimates, {"couplant": patch} if patch else {}, len(tof), rms, "us", issues, curves)
 

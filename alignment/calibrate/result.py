@@ -37,7 +37,10 @@ class Estimate:
 
 @dataclass(frozen=True, eq=False)
 class Calibration:
-    """Result of one calibration: estimates by name, the setup patch, what to say, and curves to draw by name (k,)."""
+    """Result of one calibration: estimates by name, the setup patch, what to say, and curves to draw by name (k,).
+
+    simulated: the file says that no transducer took it; False where a file cannot say.
+    """
 
     kind: Kind
     estimates: Mapping[str, Estimate]
@@ -47,6 +50,7 @@ class Calibration:
     residual_unit: str
     issues: tuple[Issue, ...] = ()
     curves: Mapping[str, Array] = field(default_factory=dict)
+    simulated: bool = False
 
     @property
     def observable(self) -> bool:

@@ -6,6 +6,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.linalg import cho_factor, cho_solve
 
+from alignment.calibrate.passes import pass_starts
 from alignment.calibrate.pose_noise import Noise, Rows, Stations, Sums, correlation_inverse, fit_noise, stations
 from alignment.calibrate.result import Calibration, Estimate, factor_95
 from alignment.calibrate.sphere_model import CENTRE, LEVEL, LOSS, RADIUS, SLOPE, TCP, UNKNOWNS, Seen, SphereViews, see
@@ -63,7 +64,17 @@ def calibrate_tcp_sphere(scan: Scan, setup: Setup, radius_mm: float | None = Non
         issues.append(Issue("info", "tcp-z-rests-on", text, "Calibrate the couplant first.", "z"))
     seen = see(views, fit.unknown, fit.at_mm)
     off = views.distance_mm - seen.distance_mm
-    curves = {"pose": views.pose.astype(np.float64), "law_x_mm": views.law_tcp[:, 0], "residual_mm": off}
+    pose = views.pose_of_scan[views.pose]
+    curves = {
+        "pose": pose.astype(np.float64),
+        "pass_start": pass_starts(scan, np.unique(pose)),
+        "law_x_mm": views.law_tcp[:, 0],
+        "residual_mm": off,
+        "used_mm": fit.use["distance"].astype(np.float64),
+    }
+    if fit.levels.any():
+        curves["residual_db"] = views.level_db - seen.level_db
+        curves["used_db"] = fit.use["level"].astype(np.float64)
     rms = float(np.sqrt(np.mean(off[fit.use["distance"]] ** 2)))
     patch = tcp_patch(error, setup)
     return Calibration("tcp", estimates, patch, int(fit.use["distance"].sum()), rms, "mm", tuple(issues), curves)

@@ -21,7 +21,7 @@ class SphereViews:
 
     rotation (m, 3, 3), origin_base (m, 3): EchoBase's TCP (beam z, array x) as the robot believes it. pose (n,): row of
     these. law_tcp (n, 3): law origins in the TCP, mm. distance_mm, level_db (n,): measured; level NaN if unknown.
-    loss_b, loss_c: tilt losses of the setup, dB/deg^2.
+    loss_b, loss_c: tilt losses of the setup, dB/deg^2. pose_of_scan (m,): row of each pose in the scan's poses.
     """
 
     rotation: Array
@@ -32,6 +32,7 @@ class SphereViews:
     level_db: Array
     loss_b: float
     loss_c: float
+    pose_of_scan: NDArray[np.int64]
 
     def __len__(self) -> int:
         return len(self.pose)

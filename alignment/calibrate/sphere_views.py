@@ -50,6 +50,7 @@ def sphere_views(scan: Scan, setup: Setup) -> SphereViews:
         _level_db(scan.amplitude_pct[good]),
         max(loss.b, 1e-3),
         max(loss.c, 1e-3),
+        used.astype(np.int64),
     )
 
 

@@ -4,6 +4,7 @@ import numpy as np
 from scipy.optimize import least_squares
 from scipy.spatial.transform import Rotation
 
+from alignment.calibrate.passes import pass_starts
 from alignment.calibrate.result import Calibration
 from alignment.calibrate.tcp_poses import PlaneViews, plane_views
 from alignment.calibrate.tcp_result import PRIOR, split_held, tcp_estimates, tcp_patch
@@ -49,7 +50,14 @@ def calibrate_tcp(scan: Scan, setup: Setup) -> Calibration:
         basis = PRIOR[:, None] * kept
         solution, covariance, dof, rms = problem.solve(basis)
     estimates, issues = tcp_estimates(solution, covariance, held, dof, ADVICE)
-    curves = {"distance_mm": views.middle_mm, "slope": views.slope, "level_db": views.level_db}
+    curves = {
+        "distance_mm": views.middle_mm,
+        "slope": views.slope,
+        "level_db": views.level_db,
+        "pose": views.pose.astype(np.float64),
+        "pass_start": pass_starts(scan, views.pose),
+        **problem.left_over(),
+    }
     return Calibration("tcp", estimates, tcp_patch(solution, setup), len(scan), rms, "mm", tuple(issues), curves)
 
 
@@ -69,6 +77,8 @@ class _Problem:
         self.kinds = [np.isfinite(v) for v in (views.middle_mm, views.slope, views.level_db)]
         if np.ptp(views.level_db[self.kinds[2]]) < 1e-6 if self.kinds[2].any() else False:
             self.kinds[2] = np.zeros_like(self.kinds[2])
+        self.parts: tuple[Array, ...] = ()
+        self.used = self.kinds
 
     def residuals(self, unknown: Array, basis: Array) -> tuple[Array, ...]:
         """Return (distance, slope, level) residuals of all views; unknown = plane tilt 2, height, level, TCP error."""
@@ -84,6 +94,16 @@ class _Problem:
         level = unknown[3] - self.loss.b * tilt_b**2 - self.loss.c * tilt_c**2
         v = self.views
         return v.middle_mm - distance, v.slope - true[:, 0], v.level_db - level
+
+    def left_over(self) -> dict[str, Array]:
+        """Return what the last solution leaves of each kind (m,), NaN where a view has none: residual_<unit>, used_<unit>."""
+        out = {}
+        units = (("mm", 1.0), ("deg", 180.0 / np.pi), ("db", 1.0))
+        for (unit, scale), part, kind, used in zip(units, self.parts, self.kinds, self.used, strict=True):
+            if kind.any():
+                out[f"residual_{unit}"] = np.where(kind, scale * part, np.nan)
+                out[f"used_{unit}"] = used.astype(np.float64)
+        return out
 
     def solve(self, basis: Array) -> tuple[Array, Array, float, float]:
         """Return TCP error (6,), its covariance, degrees of freedom of the scarcest kind, rms of the distances."""
@@ -121,6 +141,7 @@ class _Problem:
         covariance = _by_pose(found.jac, found.fun, pose, covariance)
         block = basis @ covariance[4:, 4:] @ basis.T
         rms = float(np.sqrt(np.mean(parts[0][kinds[0]] ** 2)))
+        self.parts, self.used = parts, kinds
         return basis @ unknown[4:], block, min(free), rms
 
 

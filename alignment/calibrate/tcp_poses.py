@@ -23,13 +23,14 @@ class PlaneViews:
 
     Ts_base_tcp: EchoBase's TCP (beam z, array x) as the robot believes it, stack m. middle_mm (m,): distance of the target
     from the middle of the array. slope (m,): change of distance per mm along the array, NaN for a single crystal.
-    level_db (m,): mean amplitude, NaN if unknown.
+    level_db (m,): mean amplitude, NaN if unknown. pose (m,): row in the poses of the scan.
     """
 
     Ts_base_tcp: Transform
     middle_mm: Array
     slope: Array
     level_db: Array
+    pose: NDArray[np.int64]
 
 
 def plane_views(scan: Scan, setup: Setup) -> PlaneViews:
@@ -57,9 +58,10 @@ def plane_views(scan: Scan, setup: Setup) -> PlaneViews:
             "View a fixed flat target from 20 or more poses, tilted both ways and turned about the beam.",
             scan.name,
         )
-    tcp = scan.Ts_scan_tcp[np.flatnonzero(use)] @ tool_axes(setup.tool)
+    seen = np.flatnonzero(use)
+    tcp = scan.Ts_scan_tcp[seen] @ tool_axes(setup.tool)
     poses = Transform("base", "tcp", tcp.rigid)
-    return PlaneViews(poses, middle[use], slope[use], np.where(np.isfinite(level[use]), level[use], np.nan))
+    return PlaneViews(poses, middle[use], slope[use], np.where(np.isfinite(level[use]), level[use], np.nan), seen)
 
 
 def _lines(pose: NDArray[np.int32], x: Array, d: Array, poses: int, single: bool) -> tuple[Array, Array]:

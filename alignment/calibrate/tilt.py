@@ -3,6 +3,7 @@
 import numpy as np
 
 from alignment.calibrate.result import Calibration, Estimate, Status, factor_95
+from alignment.calibrate.tilt_curve import fitted_curves
 from planner.errors import fail
 from planner.frames import Array
 from planner.issues import Issue
@@ -55,6 +56,7 @@ def calibrate_tilt(
             patch[axis] = round(estimate.value, 4)
             estimates[f"zero_{axis}"] = _zero(axis, at, solution, covariance, dof)
     curves = {"b_deg": b, "c_deg": c, "level_db": level - solution[0], "used": keep.astype(np.float64)}
+    curves |= fitted_curves(curves, at, solution, covariance, factor_95(dof))
     full = {"probe": {"tilt_loss_db_per_deg2": patch}} if patch else {}
     return Calibration("tilt", estimates, full, int(good.sum()), rms, "dB", tuple(issues), curves)
 

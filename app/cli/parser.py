@@ -215,6 +215,9 @@ def _calibrate(commands: "argparse._SubParsersAction[argparse.ArgumentParser]") 
     sub.add_argument("--radius-mm", type=_positive, metavar="R", help="tcp: radius of the sphere; default: to be found")
     sub.add_argument("--setup", type=Path, metavar="setup.json", help="the cell as it is believed to be")
     sub.add_argument("-o", "--output", type=Path, metavar="patch.json", help="write the patch of setup.json here")
+    sub.add_argument(
+        "--report", type=Path, metavar="calibration.html", help="write the report, with the curves drawn, here"
+    )
 
 
 def _robot(commands: "argparse._SubParsersAction[argparse.ArgumentParser]") -> None:

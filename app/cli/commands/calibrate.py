@@ -4,11 +4,10 @@ import argparse
 import json
 from typing import Any
 
-from alignment.calibrate import calibrate
-from alignment.calibrate.result import Target
 from app.cli.run import DONE, FAILED, say, say_issues
 from app.folder import write_artifacts
 from app.inputs import read_setup
+from app.steps.calibrate import run_calibration
 from planner.errors import fail
 
 
@@ -17,11 +16,8 @@ def run(args: argparse.Namespace) -> tuple[dict[str, Any], int]:
     for path in args.files:
         if not path.is_file():
             raise fail("file-missing", f"there is no file '{path.name}'.", "Check the path.", str(path))
-    target: Target = "sphere" if args.radius_mm is not None else args.target
-    if args.kind != "tcp" and target != "plane":
-        raise fail("calibration-target", "A sphere calibrates the TCP only.", "Leave --target and --radius-mm out.")
-    found = calibrate(args.kind, args.files, read_setup(args.setup), target, args.radius_mm)
-    content = found.to_json()
+    made = run_calibration(args.kind, args.files, read_setup(args.setup), args.target, args.radius_mm)
+    found, content = made.found, made.content
     for name, value in content["estimates"].items():
         say(
             args,
@@ -33,4 +29,6 @@ def run(args: argparse.Namespace) -> tuple[dict[str, Any], int]:
     say(args, "patch of setup.json: " + patch.strip())
     if args.output is not None:
         write_artifacts(args.output.parent, {args.output.name: patch.encode()})
-    return {"ok": found.observable, **content}, DONE if found.observable else FAILED
+    if args.report is not None:
+        write_artifacts(args.report.parent, {args.report.name: made.report.html()})
+    return content, DONE if found.observable else FAILED
