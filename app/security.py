@@ -34,7 +34,7 @@ HEADERS = {
     "cross-origin-resource-policy": "same-origin",
     "permissions-policy": "camera=(), microphone=(), geolocation=(), usb=(), serial=()",
 }
-UPLOADS = re.compile(r"^/api/v1/projects/(?:[^/]+/(?:part|scans)|import)$")
+UPLOADS = re.compile(r"^/api/v1/projects/(?:[^/]+/(?:part|scans|calibrations/[^/]+)|import)$")
 SAFE_METHODS = {"GET", "HEAD"}
 # What is read and forgotten of a request that is refused while it still comes (bytes, s).
 DRAIN_BYTES, DRAIN_S = 64 * 2**20, 5.0

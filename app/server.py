@@ -19,6 +19,7 @@ from starlette.types import Scope
 from app.api import (
     archive_routes,
     batch_routes,
+    calibration_routes,
     cell_routes,
     errors,
     inputs,
@@ -92,6 +93,7 @@ def create_app(settings: ServerSettings) -> FastAPI:
         part,
         inputs,
         cell_routes,
+        calibration_routes,
         work,
         scan_routes,
         report_routes,

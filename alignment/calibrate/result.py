@@ -5,7 +5,7 @@ from dataclasses import dataclass, field
 from typing import Any, Literal
 
 import numpy as np
-from scipy.stats import t as student
+from scipy.special import stdtrit
 
 from planner.frames import Array
 from planner.issues import Issue
@@ -72,4 +72,4 @@ class Calibration:
 
 def factor_95(dof: float) -> float:
     """Return the half width of a 95 % region in standard deviations estimated with `dof` degrees of freedom."""
-    return float(student.ppf(0.975, max(dof, 1.0)))
+    return float(stdtrit(max(dof, 1.0), 0.975))

@@ -15,7 +15,8 @@ from app.report.known import ScanFacts, record_lines, temperatures
 from app.report.package import Pages, Report
 from app.report.pictures import pass_distance_mm
 from app.report.record import Record
-from app.report.sections import inputs_of, issues_of
+from app.report.said import issues_of
+from app.report.sections import inputs_of
 from app.report.sheet import Sheet, fill, sheet_of
 from app.report.shown import limit_of, number, percent, shown
 from planner.frames import Array

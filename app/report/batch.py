@@ -12,7 +12,7 @@ from app.plan import Plan
 from app.report.document import Cell, Column, Document, Figure, Heading, Table, Text, Verdict
 from app.report.figures import Panel, Scale, maps_svg, states_svg
 from app.report.package import Pages, Report
-from app.report.sections import issues_of
+from app.report.said import issues_of
 from app.report.sheet import Sheet, fill, sheet_of
 from app.report.shown import POSE_TITLES, limit_of, number, shown, six, whole
 from app.report.strips import Strip, strips_svg

@@ -10,7 +10,7 @@ from alignment.calibrate.result import Calibration, Estimate
 from app.report.calibration_figures import calibration_svg
 from app.report.document import Block, Cell, Column, Document, Figure, Heading, Table, Text, Verdict
 from app.report.package import Pages, Report
-from app.report.sections import issues_of
+from app.report.said import issues_of
 from app.report.shown import number
 from planner.setup import Setup
 

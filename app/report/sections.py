@@ -8,8 +8,9 @@ import numpy as np
 from alignment.estimate.directions import Direction
 from alignment.estimate.verdict import describe
 from app.plan import Plan
-from app.report.document import Block, Cell, Column, Heading, Issues, Said, Table, Text, Verdict
+from app.report.document import Block, Cell, Column, Heading, Table, Text, Verdict
 from app.report.known import ScanFacts, temperature_mm_per_c
+from app.report.said import issues_of
 from app.report.shown import POSE_TITLES, number, percent, shown, six, whole
 from planner.frames import AXES
 from planner.issues import Issue
@@ -32,14 +33,6 @@ def verdict_of(content: dict[str, Any]) -> list[Block]:
     verdict = content["verdict"]
     out: list[Block] = [Verdict(tone=verdict, word=WORDS[verdict], text=MEANING[verdict])]
     return out + issues_of(content["issues"])
-
-
-def issues_of(found: Sequence[Any]) -> list[Block]:
-    """Return issues (JSON or nouns), errors first."""
-    plain = [i.to_json() if isinstance(i, Issue) else i for i in found]
-    rank = {"error": 0, "warning": 1, "info": 2}
-    said = [Said(**{k: i[k] for k in ("severity", "message", "remedy", "where")}) for i in plain]
-    return [Issues(issues=tuple(sorted(said, key=lambda s: rank[s.severity])))] if said else []
 
 
 def correction_of(plan: Plan, content: dict[str, Any]) -> list[Block]:
