@@ -3,6 +3,7 @@
 import { ApiError, get } from "../api.js";
 import { button, h } from "../dom.js";
 import { baseFit, newFit } from "../drawer/basefit.js";
+import { calibrate, newCalibration } from "../drawer/calibrate.js";
 import { field, fieldsOf, at, title, withValue } from "../form.js";
 import { AXES, fixed, poseKey } from "../format.js";
 
@@ -25,6 +26,8 @@ async function schema() {
 }
 
 const GROUPS = ["probe", "couplant", "tool", "base", "placement", "robot_root", "signals", "fixture", "tolerances", "alignment", "inspection", "limits"];
+// Groups of the form that measurements can fill in, by the kind of calibration.
+const CALIBRATIONS = { probe: "tilt", couplant: "couplant", tool: "tcp" };
 const WORDS = { base: "BASE (nominal)", placement: "CAD origin in BASE", robot_root: "Robot foot in world", fixture: "Fixture, one sigma", limits: "Largest correction", alignment: "Alignment scan", inspection: "Inspection raster", tool: "Tool", tcp: "TCP in flange" };
 
 export function content(shell) {
@@ -43,17 +46,25 @@ export function content(shell) {
   const group = (f) => h("details", { class: "group", open: local.open.has(f.key), ontoggle: (e) => local.open[e.target.open ? "add" : "delete"](f.key) },
     h("summary", { data: { key: `group-${f.key}` } }, h("span", {}, WORDS[f.key] ?? title(f.key)), h("span", { class: "glance num" }, glance(f.key, draft))),
     h("div", { class: "fields" }, f.children.map((c) => (c.children ? [h("p", { class: "soft small" }, WORDS[c.key] ?? title(c.key)), c.children.map((d) => one(d))] : one(c))),
-      f.key === "base" && button("Fit to touched points…", () => { local.fit ??= newFit(); shell.drawer.open = true; shell.draw(); shell.drawer.draw(); }, { key: "fit-open" })));
+      f.key === "base" && button("Fit to touched points…", () => { local.fit ??= newFit(); show(shell, "fit"); }, { key: "fit-open" }),
+      CALIBRATIONS[f.key] && button("Calibrate…", () => { if (local.calibration?.kind !== CALIBRATIONS[f.key]) local.calibration = newCalibration(CALIBRATIONS[f.key]); show(shell, "calibrate"); }, { key: `calibrate-${f.key}` })));
   return [h("div", {}, plain.map((f) => one(f))), h("div", {}, GROUPS.filter((k) => named[k]).map((k) => group(named[k])))];
 }
 
 const robotSchema = (schema, robots) => ({ ...schema, choices: robots.map((r) => [r.name, r.title]) });
 
-/** The fit of BASE to touched points, while somebody does it. */
+function show(shell, tab) {
+  shell.drawer.chosen.cell = tab;
+  shell.drawer.open = true;
+  shell.draw();
+  shell.drawer.draw();
+}
+
+/** The fit of BASE to touched points, and a calibration, while somebody does them. */
 export function drawer(shell) {
   const local = shell.local.cell;
-  if (!local?.fit || !shell.project.data.setup) return { tabs: [], stamp: "" };
   const { setup } = shell.project.data;
+  if (!setup || !(local?.fit || local?.calibration)) return { tabs: [], stamp: "" };
   const use = (base) => {
     const draft = local.draft ?? setup;
     const rounded = Object.fromEntries(AXES.map((a) => [poseKey(a), Number(base[poseKey(a)].toFixed(6))]));
@@ -61,7 +72,11 @@ export function drawer(shell) {
     local.fit = null;
     shell.draw();
   };
-  return { stamp: "fit", tabs: [{ key: "fit", title: "BASE from touched points", draw: (body) => baseFit(body, local.fit, shell.project.id, () => (local.draft ?? setup).placement, use) }] };
+  const fit = local.fit && { key: "fit", title: "BASE from touched points", draw: (body) => baseFit(body, local.fit, shell.project.id, () => (local.draft ?? shell.project.data.setup).placement, use) };
+  const calibration = local.calibration && { key: "calibrate", title: "Calibrate", draw: (body) => calibrate(body, shell, local) };
+  // What is in force, and whether there are unsaved changes, is part of what a calibration shows.
+  const stamp = local.calibration ? `${local.calibration.kind} ${Boolean(local.draft)} ${JSON.stringify(setup)}` : "fit";
+  return { stamp, tabs: [fit, calibration].filter(Boolean) };
 }
 
 /** The numbers of a group in one line. */

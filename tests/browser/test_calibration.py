@@ -1,0 +1,87 @@
+"""A calibration in the page: files in, values and curve seen, the patch put in force and taken back."""
+
+import json
+import urllib.request
+
+import pytest
+
+from tests.api.test_calibrations import couplant_csv, tilt_csv
+from tests.browser.eyes import Watch, until
+from tests.browser.real_server import RealServer
+
+pytestmark = [pytest.mark.browser, pytest.mark.slow, pytest.mark.timeout(300)]
+
+
+@pytest.fixture(scope="module")
+def server(tmp_path_factory):
+    made = RealServer(tmp_path_factory.mktemp("calibration") / "data")
+    yield made
+    made.stop()
+
+
+def rest(server, path, method="GET", body=None):
+    sent = None if body is None else json.dumps(body).encode()
+    headers = {"Content-Type": "application/json"}
+    request = urllib.request.Request(f"{server.url}/api/v1{path}", sent, headers, method=method)
+    with urllib.request.urlopen(request) as answer:
+        return json.load(answer)
+
+
+def give(page, name, content):
+    files = page.locator('input[name="calibration-files"]')
+    files.set_input_files({"name": name, "mimeType": "text/csv", "buffer": content})
+
+
+def test_calibrate_see_use_and_undo(server, chromium, tmp_path):
+    pid = rest(server, "/projects", "POST", {"name": "Cell"})["id"]
+    context = chromium.new_context(viewport={"width": 1024, "height": 900}, accept_downloads=True)
+    page = context.new_page()
+    page.watch = Watch(server.url).on(page)
+    page.goto(f"{server.url}/#/p/{pid}/cell")
+    page.locator('[data-key="group-probe"]').click()
+    page.locator('[data-key="calibrate-probe"]').click()
+
+    def losses():
+        return rest(server, f"/projects/{pid}/setup")["probe"]["tilt_loss_db_per_deg2"]
+
+    before = losses()
+    # A file of another kind is a sentence, and the tab stays usable.
+    give(page, "gaps.csv", couplant_csv())
+    page.locator(".calibrate .issue.error", has_text="b_deg").wait_for()
+    give(page, "tilt.csv", tilt_csv())
+    row = page.locator(".calibrate tr", has_text="Tilt loss about B")
+    row.wait_for()
+    assert "measured" in row.inner_text()
+    assert "1.7" in row.inner_text()
+    drawn = page.locator(".calibrate .figure img")
+    until(page, lambda: drawn.evaluate("i => i.complete && i.naturalWidth > 300"), what="the drawing")
+    assert losses() == before
+    change = page.locator(".calibrate table.patch tr", has_text="tilt_loss_db_per_deg2.c")
+    assert [float(v) for v in change.locator("td.num").all_inner_texts()] == [before["c"], 0.8]
+    with page.expect_download() as got:
+        page.get_by_role("link", name="Report of the calibration").click()
+    got.value.save_as(tmp_path / "report.html")
+    assert "Tilt loss of the probe" in (tmp_path / "report.html").read_text()
+
+    use = page.get_by_role("button", name="Use in the setup")
+    use.dblclick()
+    page.locator(".calibrate .tag", has_text="in force").wait_for()
+    assert losses() == {"b": 1.7, "c": 0.8}
+    assert use.is_disabled()
+    undo = page.locator(".inspector footer").get_by_role("button", name="Undo")
+    undo.click()
+    until(page, lambda: losses() == before, what="the undo")
+    assert undo.is_disabled()
+    # Somebody else changes the cell: the patch is of an earlier one and can no longer be used by a wrong click.
+    use.wait_for()
+    until(page, use.is_enabled, what="the offer to use it again")
+    other = rest(server, f"/projects/{pid}/setup")
+    other["tool"]["tcp"]["z_mm"] = 123.0
+    rest(server, f"/projects/{pid}/setup", "PUT", other)
+    page.get_by_text("The cell was changed since.").wait_for()
+    assert use.is_disabled()
+    assert losses() == before
+    refused = "the server responded with a status of 422"
+    assert [c for c in page.watch.complaints if refused not in c] == []
+    assert page.watch.foreign == []
+    context.close()
