@@ -50,23 +50,25 @@ def _tilt(curves: Mapping[str, Array]) -> Figure:
     figure, axes = _figure(1, 2, 2.7, sharey=True)
     used = curves["used"] > 0.5
     drawn = [axis for axis in ("b", "c") if f"{axis}_fit_deg" in curves]
-    lowest = min(float(np.nanmin(curves[f"{axis}_seen_db"])) for axis in drawn)
-    lowest_fit = min(float((curves[f"{axis}_fit_db"] - curves[f"{axis}_fit_half_db"]).min()) for axis in drawn)
+    seen = np.concatenate([curves[f"{axis}_seen_db"] for axis in drawn])
+    fit, half = (np.concatenate([curves[f"{axis}_fit_{name}"] for axis in drawn]) for name in ("db", "half_db"))
     for ax, axis in zip(axes[0], ("b", "c"), strict=True):
         ax.set_xlabel(f"tilt about {axis.upper()} (deg)")
         if axis not in drawn:
             ax.text(0.5, 0.5, "not turned", ha="center", va="center", color=SOFT, transform=ax.transAxes)
             ax.set_xticks([])
             continue
-        x, y, half = (curves[f"{axis}_fit_{name}"] for name in ("deg", "db", "half_db"))
-        ax.fill_between(x, y - half, y + half, color=ACCENT, alpha=0.22, lw=0, label="its 95 % band")
+        x, y, reach = (curves[f"{axis}_fit_{name}"] for name in ("deg", "db", "half_db"))
+        ax.fill_between(x, y - reach, y + reach, color=ACCENT, alpha=0.22, lw=0, label="its 95 % band")
         ax.plot(x, y, color=ACCENT, linewidth=1.0, label="fitted")
         _points(ax, curves[f"{axis}_deg"], curves[f"{axis}_seen_db"], used, "o")
         ax.axhline(0.0, color=MUTED, linewidth=0.5, zorder=0)
     axes[0][0].set_ylabel("amplitude over the largest (dB)")
     # Noise floor and side lobes may lie far below; the curve is what this is about.
-    bottom = max(lowest, 1.5 * lowest_fit - 1.0)
-    axes[0][0].set_ylim(bottom - 0.05 * abs(bottom) - 0.2, 0.06 * abs(bottom) + 0.5)
+    top, lowest = max(np.nanmax(seen), (fit + half).max()), (fit - half).min()
+    bottom = max(np.nanmin(seen), lowest - 0.5 * (top - lowest) - 1.0)
+    rim = 0.05 * (top - bottom) + 0.02
+    axes[0][0].set_ylim(bottom - rim, top + rim)
     _legend(axes[0]["bc".index(drawn[0])])
     return figure
 
