@@ -24,7 +24,10 @@ def read_table(
         table = pl.read_csv(path, infer_schema_length=None, comment_prefix="#", n_rows=MAX_ROWS)
     except (pl.exceptions.PolarsError, OSError, ValueError) as error:
         raise fail(
-            "calibration-file", "The file cannot be read as CSV.", "Save it as CSV with a header.", shown
+            "calibration-file",
+            "The file cannot be read as CSV.",
+            "Save it as CSV in UTF-8 with a header, commas between columns and points in numbers.",
+            shown,
         ) from error
     names = {column.strip().lower(): column for column in table.columns}
     missing = [column for column in required if column not in names]

@@ -129,10 +129,14 @@ def _points(
 ) -> None:
     """Draw readings; those left out of the fit as rings."""
     look: dict[str, Any] = {"linestyle": "none", "markersize": size, "rasterized": len(x) > MOST_SHAPES}
-    ax.plot(x[used], y[used], marker=marker, color=INK, markeredgewidth=0.0, label=title, **look)
+    ax.plot(x[used], y[used], marker=marker, color=INK, markeredgewidth=0.0, label=title, zorder=2.5, **look)
     if not used.all():
-        rings: dict[str, Any] = {"markerfacecolor": "none", "markeredgecolor": OUT, "markeredgewidth": 0.6}
-        ax.plot(x[~used], y[~used], marker=marker, label="left out", **rings, **look)
+        rings: dict[str, Any] = {
+            "markerfacecolor": "none",
+            "markeredgecolor": OUT,
+            "markeredgewidth": 0.6 if len(x) < MOST_SHAPES else 0.25,
+        }
+        ax.plot(x[~used], y[~used], marker=marker, label="left out", zorder=2.0, **rings, **look)
 
 
 def _spread(ax: Axes, off: Array) -> None:
