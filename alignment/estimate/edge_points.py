@@ -29,7 +29,7 @@ class EdgePoints:
     """k crossings between two readings each, one on the part and one off it.
 
     on_base, off_base (k, 3): where their laws stand, mm; share_on, share_off (k,): their amplitudes over the plateau.
-    window (k, 8): shares from three readings further on to three further off the part, NaN where there are none;
+    window (k, 8): shares from three readings further on to three further off the part, NaN where there are none to trust;
     window_other (k, 8): the same if tilt takes of the echo what it may take as well. at, at_other (k,): place of the edge
     from on (0) to off (1), by either. travel_base (k, 3): unit direction of travel. along (k,): True if found along the
     pass, False if across the laws. pass_id, s_mm, law (k,).
@@ -81,11 +81,12 @@ def edge_points(cloud: PointCloud, line: PoseLine, probe: Probe, loss_db: Array,
     """
     if cloud.beams_base is None or cloud.arrays_base is None or not np.isfinite(cloud.amplitude_pct).any():
         return _none()
-    share = _shares(cloud, line, probe, 10.0 ** (loss_db / 20.0))
-    if share is None:
+    shares = _shares(cloud, line, probe, 10.0 ** (loss_db / 20.0))
+    if shares is None:
         return _none()
-    other = _shares(cloud, line, probe, 10.0 ** (loss_other_db / 20.0)) if loss_other_db.any() else share
-    assert other is not None
+    others = _shares(cloud, line, probe, 10.0 ** (loss_other_db / 20.0)) if loss_other_db.any() else shares
+    assert others is not None
+    share, measured = shares
     x = law_offsets_mm(probe)
     step = np.abs(np.diff(line.s_mm))
     same = (np.diff(line.pass_id) == 0) & line.present[1:] & line.present[:-1] & (step < MOST_GAP_MM) & (step > 1e-6)
@@ -101,8 +102,8 @@ def edge_points(cloud: PointCloud, line: PoseLine, probe: Probe, loss_db: Array,
         origin[1],
         share[pose[:, 0], law[:, 0]],
         share[pose[:, 1], law[:, 1]],
-        _windows(share, line, pose, law),
-        _windows(other, line, pose, law),
+        _windows(measured, line, pose, law),
+        _windows(others[1], line, pose, law),
         np.full(len(pose), 0.5),
         np.full(len(pose), 0.5),
         line.travel_base[pose[:, 0]],
@@ -113,7 +114,9 @@ def edge_points(cloud: PointCloud, line: PoseLine, probe: Probe, loss_db: Array,
     )
     loss = _windows(loss_db, line, pose, law)
     told = (np.nanmax(loss, axis=1) < MOST_LOSS_DB) & (np.nanmax(np.abs(np.diff(loss, axis=1)), axis=1) < MOST_STEP_DB)
-    return found.take(_clear(found.window) & told)
+    # Both readings next to the edge have to be measured ones: what was mended says on which side, not how far.
+    sure = np.isfinite(found.window[:, 3:5]).all(axis=1) & np.isfinite(found.window_other[:, 3:5]).all(axis=1)
+    return found.take(_clear(_windows(share, line, pose, law)) & told & sure)
 
 
 def _clear(window: Array) -> NDArray[np.bool_]:
@@ -127,8 +130,12 @@ def _clear(window: Array) -> NDArray[np.bool_]:
     return stays & (known_on >= 3) & (known_off >= 2)
 
 
-def _shares(cloud: PointCloud, line: PoseLine, probe: Probe, gain: Array) -> Array | None:
-    """Return the amplitude of every pose and law over its plateau (m, laws): 0 where no echo came back."""
+def _shares(cloud: PointCloud, line: PoseLine, probe: Probe, gain: Array) -> tuple[Array, Array] | None:
+    """Return the amplitude of every pose and law over its plateau, twice (m, laws): 0 where no echo came back.
+
+    First with odd readings mended, which tells on from off the part; then with NaN in their place: the median of neighbours
+    is no measurement, and near an edge it would pull the edge to where the neighbours are.
+    """
     m, laws = len(line.present), probe.laws
     amplitude = np.zeros((m, laws))
     known = np.zeros((m, laws), dtype=bool)
@@ -143,11 +150,11 @@ def _shares(cloud: PointCloud, line: PoseLine, probe: Probe, gain: Array) -> Arr
     spacing = max(line.spacing_mm, 1e-3)
     along = 2 * max(1, round(PLATEAU_ALONG_MM / spacing)) + 1
     across = 2 * max(1, round(PLATEAU_ACROSS_MM / probe.pitch_mm)) + 1 if laws > 1 else 1
-    out = np.zeros((m, laws))
+    out, sure = np.zeros((m, laws)), np.zeros((m, laws), dtype=bool)
     for first, last in _runs(line):
         part = slice(first, last)
         a, k = amplitude[part], known[part]
-        a = _mend(a, k, usual)
+        a, sure[part] = _mend(a, k, usual)
         plateau = np.full(a.shape, usual)
         for level in (0.5, 0.85, 0.95):
             loud = a > level * plateau
@@ -155,7 +162,7 @@ def _shares(cloud: PointCloud, line: PoseLine, probe: Probe, gain: Array) -> Arr
             total = uniform_filter(np.where(loud, a, 0.0), (along, across), mode="constant")
             plateau = np.where(weight > 1e-9, total / np.maximum(weight, 1e-9), plateau)
         out[part] = np.minimum(a / plateau, 1.5)
-    return out
+    return out, np.where(sure, out, np.nan)
 
 
 def _runs(line: PoseLine) -> list[tuple[int, int]]:
@@ -163,8 +170,8 @@ def _runs(line: PoseLine) -> list[tuple[int, int]]:
     return list(zip(np.r_[0, cut], np.r_[cut, len(line.pass_id)], strict=True))
 
 
-def _mend(a: Array, known: NDArray[np.bool_], usual: float) -> Array:
-    """Replace what contradicts its neighbours, an echo lost by chance or a splash, by their median.
+def _mend(a: Array, known: NDArray[np.bool_], usual: float) -> tuple[Array, NDArray[np.bool_]]:
+    """Replace what contradicts its neighbours, an echo lost by chance or a splash, by their median; say what was left as is.
 
     Only readings on the other side of half amplitude than their neighbours' median are touched: edges stay where they are.
     """
@@ -175,7 +182,8 @@ def _mend(a: Array, known: NDArray[np.bool_], usual: float) -> Array:
     mended = np.where(odd, middle, a)
     middle = median_filter(mended, size=size, mode="nearest")
     odd = (a > 0.5 * usual) != (middle > 0.5 * usual)
-    return np.where(odd | ~known, middle, a)
+    # What was never recorded, where nothing is heard, is the silence of an echo that a file has no row for.
+    return np.where(odd | ~known, middle, a), ~odd
 
 
 def _crosses(a: Array, b: Array) -> NDArray[np.bool_]:
