@@ -70,11 +70,12 @@ def test_a_twisted_part_moved_and_sprung_back(folder):
         for old in (folder / "corrected").glob("*"):
             old.unlink()
         put(folder, done.artifacts)
-        assert done.correction["verdict"] == "pass"
-        # Followed, the part stays on its edges; the rigid placement that leaves least has slid, and says so.
+        # Followed, it passes; a rigid fit that leaves more than three times position_mm of the shape is partial, and says why.
+        assert done.correction["verdict"] == ("pass" if non_rigid else "partial")
+        assert ("not-rigid" in {i["code"] for i in done.correction["issues"]}) != non_rigid
+        # Either way the part stays on its edges.
         error = np.array([done.correction["correction"][k] for k in SIX]) - OFFSET.xyzabc
-        assert (np.abs(error) < [0.6, 0.6, 0.3, 0.2, 0.2, 0.3]).all() == non_rigid
-        assert ("off-edges" in {i["code"] for i in done.correction["issues"]}) != non_rigid
+        assert (np.abs(error) < [0.6, 0.6, 0.3, 0.2, 0.2, 0.3]).all()
         assert done.correction["non_rigid"]["applied"] is non_rigid
         inspected = scan(folder, "corrected", truth, body, "inspection.csv", 6)
         figures[non_rigid] = run_assess(folder, [inspected], AssessOptions(), quiet).content["after"]
