@@ -4,11 +4,15 @@ import numpy as np
 
 from alignment.cloud import PointCloud
 from alignment.estimate.capture import Captured, capture
+from alignment.estimate.consensus import agreement
 from alignment.estimate.hypotheses import Hypothesis, array_hypotheses, place_hypotheses, thinned
 from alignment.estimate.map import MapFit
+from alignment.estimate.patches import model_readings, reading_weights
 from alignment.estimate.problem import Problem
 from alignment.estimate.robust import mad_sigma
+from alignment.estimate.surface_rows import distance_rows
 from planner.couplant import sound_speed_m_s, water_speed_m_s
+from planner.frames import Transform
 from planner.issues import Issue
 from planner.setup import Setup
 
@@ -18,6 +22,8 @@ FITS_SHARE = 0.6
 FITS_MM = 0.4
 # Another explanation has to be this much better than the given one.
 BETTER = 0.5
+# Or it fits at least as well, and so much more of the scan agrees with it: the rest of the given one may be called outliers.
+MORE_AGREE = 0.1
 # Of a scan that fits far from nominal, one that fits nearly as well and near is the likelier.
 NEARLY = 2.5
 # Farther than this from nominal, in standard deviations of the fixture, is no explanation.
@@ -63,7 +69,7 @@ def diagnose_fit(cloud: PointCloud, problem: Problem, found: MapFit) -> list[Iss
         hypotheses += place_hypotheses(problem.setup)
     # Of a part that sprang back the careful fit may leave more than the quick one: what counts is what fits at all.
     scatter = found.captured.scatter_mm if found.captured.converged else sigma
-    better = _best(cloud, problem, scatter, hypotheses, _beyond_limits(found, problem))
+    better = _best(cloud, problem, scatter, hypotheses, _beyond_limits(found, problem), found.T_base_part)
     if better is not None:
         # A scan that fits as it stands, only far from nominal, may be just that: two readings of it are possible, and
         # the engineer who knows the fixture decides.
@@ -103,16 +109,24 @@ def _beyond_limits(found: MapFit, problem: Problem) -> bool:
 
 
 def _best(
-    cloud: PointCloud, problem: Problem, scatter_mm: float, hypotheses: list[Hypothesis], far: bool = False
+    cloud: PointCloud,
+    problem: Problem,
+    scatter_mm: float,
+    hypotheses: list[Hypothesis],
+    far: bool = False,
+    T_base_part: Transform | None = None,
 ) -> Hypothesis | None:
     """Return the hypothesis that fits best, if it fits well and clearly better than the scan as given.
 
-    far: the scan as given fits, but far from nominal; then one that fits as well and near counts too.
+    far: the scan as given fits, but far from nominal; then one that fits as well and near counts too. T_base_part: where the
+    scan as given puts the part; then one that fits better, and that clearly more of the readings agree with, counts too.
     """
     small = thinned(cloud, SAMPLE)
+    agrees = np.inf if T_base_part is None else _agreement(small, problem, T_base_part)
     best, chosen = np.inf, None
     for hypothesis in hypotheses:
-        found = capture(hypothesis.apply(small), problem)
+        other = hypothesis.apply(small)
+        found = capture(other, problem)
         if not found.converged or found.valid_share < FITS_SHARE or found.scatter_mm > FITS_MM:
             continue
         away = float(np.abs(problem.total(found.T_base_part)).max())
@@ -121,9 +135,19 @@ def _best(
             continue
         near = far and away < 2.0
         wanted = NEARLY * scatter_mm if near else BETTER * scatter_mm
+        if not near and _agreement(other, problem, found.T_base_part) > agrees + MORE_AGREE:
+            wanted = scatter_mm
         if found.scatter_mm < min(best, wanted):
             best, chosen = found.scatter_mm, hypothesis
     return chosen
+
+
+def _agreement(cloud: PointCloud, problem: Problem, T_base_part: Transform) -> float:
+    """Return the share of the readings that agree with a placement."""
+    origins, distance = model_readings(cloud, problem.setup.alignment.point_model)
+    centre = problem.centre_mm(T_base_part)
+    rows = distance_rows(problem.curved, T_base_part, centre, origins, distance, cloud.beams_base)
+    return agreement(rows, reading_weights(cloud))[0]
 
 
 def speed_issues(found: MapFit, problem: Problem) -> list[Issue]:

@@ -9,9 +9,9 @@ import numpy as np
 from alignment.cloud import PointCloud
 from alignment.estimate.pose_line import PoseLine
 from alignment.estimate.problem import Problem
+from alignment.metrics.figures import loss_db, tilts_deg
 from planner.frames import Array, Transform
 from planner.probe import law_offsets_mm
-from planner.setup import Probe
 
 # Tilt changes slowly: it is looked up at this many laws, and at poses not nearer than this (mm), and interpolated.
 LAWS, SPACING_MM = 9, 2.0
@@ -42,23 +42,14 @@ def tilt_loss_db(cloud: PointCloud, line: PoseLine, problem: Problem, T_base_par
     beyond = off - np.einsum("ij,ij->i", off, foot.normals)[:, None] * foot.normals
     bent = foot.normals + np.einsum("nij,nj->ni", problem.curved.shape_operator(foot.face, foot.bary), beyond)
     bent /= np.linalg.norm(bent, axis=1, keepdims=True)
-    every = np.arange(len(x))
-    k = np.clip(np.searchsorted(at, every, side="right") - 1, 0, max(len(at) - 2, 0))
-    share = (every - at[k]) / np.maximum(at[np.minimum(k + 1, len(at) - 1)] - at[k], 1)
-    between = lambda v: v[:, k] * (1.0 - share) + v[:, np.minimum(k + 1, len(at) - 1)] * share  # noqa: E731
-    nearest = np.clip(np.searchsorted(some, rows), 0, len(some) - 1)
+    # Linear between the laws looked up; a pose takes the tilt of the next one looked up.
+    weights = np.stack([np.interp(np.arange(len(x)), at, one) for one in np.eye(len(at))])
+    place = np.minimum(np.searchsorted(some, rows), len(some) - 1)
+    beams, arrays = (np.repeat(v, len(at), axis=0) for v in (z, a))
     out = []
     for normals in (foot.normals, bent):
-        n = T_base_part.directions(normals).reshape(origins.shape)
-        facing = -np.einsum("mki,mi->mk", n, z)
-        b = np.degrees(np.arctan2(np.einsum("mki,mi->mk", n, a), facing))
-        c = np.degrees(np.arctan2(np.einsum("mki,mi->mk", n, np.cross(z, a)), facing))
+        tilts = tilts_deg(beams, arrays, T_base_part.directions(normals))
+        b, c = (v.reshape(len(some), len(at)) @ weights for v in tilts)
         out.append(np.zeros_like(loss))
-        out[-1][rows] = loss_of(between(b), between(c), probe)[nearest]
+        out[-1][rows] = np.minimum(-loss_db(b, c, probe), MOST_DB)[place]
     return out[0], out[1]
-
-
-def loss_of(b_deg: Array, c_deg: Array, probe: Probe) -> Array:
-    """Return the loss (dB, positive) of tilts in the two axes of the array (deg), down to the floor."""
-    per = probe.tilt_loss_db_per_deg2
-    return np.asarray(np.minimum(per.b * b_deg**2 + per.c * c_deg**2, MOST_DB))

@@ -4,8 +4,9 @@ import numpy as np
 from scipy.special import ndtr
 
 from alignment.cloud import PointCloud
-from alignment.estimate.edge_gain import loss_of
+from alignment.estimate.edge_gain import MOST_DB
 from alignment.estimate.edge_rows import EdgeMap
+from alignment.metrics.figures import loss_db, tilts_deg
 from planner.errors import fail
 from planner.frames import Array
 from planner.placement import assume_nominal
@@ -39,12 +40,10 @@ def expected_cloud(path: ToolPath, curved: CurvedSurface, setup: Setup) -> Point
     flat = origins.reshape(-1, 3)
     foot = curved.closest(flat)
     share = ndtr(-_beyond_mm(flat, foot.points, foot.normals, curved) / (setup.probe.beam_width_mm / 2.5))
-    n = foot.normals.reshape(m, laws, 3)
-    facing, b, c = (np.einsum("mki,mi->mk", n, sign * rotation[:, :, k]) for k, sign in ((2, -1), (0, 1), (1, 1)))
-    loss_db = loss_of(np.degrees(np.arctan2(b, facing)), np.degrees(np.arctan2(c, facing)), setup.probe)
-    share *= 10.0 ** (-loss_db.reshape(-1) / 20.0)
-    heard = share > LEAST_SHARE
     pose = np.repeat(np.arange(m, dtype=np.int32), laws)
+    tilts = tilts_deg(rotation[:, :, 2][pose], rotation[:, :, 0][pose], foot.normals)
+    share *= 10.0 ** (np.maximum(loss_db(*tilts, setup.probe), -MOST_DB) / 20.0)
+    heard = share > LEAST_SHARE
     law = np.tile(np.arange(1, laws + 1, dtype=np.int32), m)
     T = assume_nominal(setup.T_base_partnom)
     base = T.points(flat)
