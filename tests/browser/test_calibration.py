@@ -70,8 +70,9 @@ def test_calibrate_see_use_and_undo(server, chromium, tmp_path):
     assert use.is_disabled()
     undo = page.locator(".inspector footer").get_by_role("button", name="Undo")
     undo.click()
+    # The server knows of the undo before the page does.
     until(page, lambda: losses() == before, what="the undo")
-    assert undo.is_disabled()
+    until(page, undo.is_disabled, what="the undo button, with nothing left to undo,")
     # Somebody else changes the cell: the patch is of an earlier one and can no longer be used by a wrong click.
     use.wait_for()
     until(page, use.is_enabled, what="the offer to use it again")
