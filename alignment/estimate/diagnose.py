@@ -5,14 +5,16 @@ import numpy as np
 from alignment.cloud import PointCloud
 from alignment.estimate.capture import Captured, capture
 from alignment.estimate.consensus import agreement
+from alignment.estimate.contest import fits_better
+from alignment.estimate.edge_diagnose import edge_issues, order_by_edges
 from alignment.estimate.hypotheses import Hypothesis, array_hypotheses, place_hypotheses, thinned
 from alignment.estimate.map import MapFit
 from alignment.estimate.patches import model_readings, reading_weights
 from alignment.estimate.problem import Problem
 from alignment.estimate.robust import mad_sigma
-from alignment.estimate.surface_rows import distance_rows
+from alignment.estimate.surface_rows import Rows, distance_rows
 from planner.couplant import sound_speed_m_s, water_speed_m_s
-from planner.frames import Transform
+from planner.frames import Array, Transform
 from planner.issues import Issue
 from planner.setup import Setup
 
@@ -36,8 +38,6 @@ SPEED_SHARE = 0.004
 # Standoffs that differ by less than this, beyond what a misplaced part makes of one, tell nothing about it (mm rms).
 LEAST_STANDOFF_SPREAD_MM = 1.0
 CHORD_MM, CHORD_DEG = 0.01, 0.1
-# No robot and no beam leaves crossings this far (rms, mm) off the edges of a part that is as its CAD.
-OFF_EDGES_MM = 0.5
 
 
 def diagnose_lost(cloud: PointCloud, problem: Problem, captured: Captured) -> list[Issue]:
@@ -70,6 +70,8 @@ def diagnose_fit(cloud: PointCloud, problem: Problem, found: MapFit) -> list[Iss
     # Of a part that sprang back the careful fit may leave more than the quick one: what counts is what fits at all.
     scatter = found.captured.scatter_mm if found.captured.converged else sigma
     better = _best(cloud, problem, scatter, hypotheses, _beyond_limits(found, problem), found.T_base_part)
+    if better is None:
+        better = order_by_edges(cloud, problem, found, hypotheses)
     if better is not None:
         # A scan that fits as it stands, only far from nominal, may be just that: two readings of it are possible, and
         # the engineer who knows the fixture decides.
@@ -91,18 +93,6 @@ def diagnose_fit(cloud: PointCloud, problem: Problem, found: MapFit) -> list[Iss
     return issues + edge_issues(found) + speed_issues(found, problem)
 
 
-def edge_issues(found: MapFit) -> list[Issue]:
-    """Return a warning where the placement that fits the surface best does not fit the edges that were crossed."""
-    off_mm = 0.0 if found.edges is None else found.edges["rms_mm"]
-    if off_mm <= OFF_EDGES_MM:
-        return []
-    text = (
-        f"at this placement the crossings lie {off_mm:.2f} mm rms off the part's edges: its shape differs from CAD, and what "
-        "fits the surface best has slid along it by about as much, beyond what sigma says."
-    )
-    return [Issue("warning", "off-edges", text, "Run the alignment as non-rigid: it stays on the edges.", "scan")]
-
-
 def _beyond_limits(found: MapFit, problem: Problem) -> bool:
     total = np.abs(problem.total(found.T_base_part))
     return bool(total.max() > 3.0)
@@ -119,10 +109,12 @@ def _best(
     """Return the hypothesis that fits best, if it fits well and clearly better than the scan as given.
 
     far: the scan as given fits, but far from nominal; then one that fits as well and near counts too. T_base_part: where the
-    scan as given puts the part; then one that fits better, and that clearly more of the readings agree with, counts too.
+    scan as given puts the part; then one that fits better, and that clearly more of the readings agree with, counts too, and
+    another order of laws that fits better all along the scan.
     """
     small = thinned(cloud, SAMPLE)
     agrees = np.inf if T_base_part is None else _agreement(small, problem, T_base_part)
+    given = capture(small, problem) if T_base_part is not None else None
     best, chosen = np.inf, None
     for hypothesis in hypotheses:
         other = hypothesis.apply(small)
@@ -137,6 +129,10 @@ def _best(
         wanted = NEARLY * scatter_mm if near else BETTER * scatter_mm
         if not near and _agreement(other, problem, found.T_base_part) > agrees + MORE_AGREE:
             wanted = scatter_mm
+        if given is not None and hypothesis.of_laws and found.scatter_mm >= wanted:
+            as_given = _residuals(small, problem, given.T_base_part)
+            if fits_better(as_given, _residuals(other, problem, found.T_base_part), found.scatter_mm):
+                wanted = np.inf
         if found.scatter_mm < min(best, wanted):
             best, chosen = found.scatter_mm, hypothesis
     return chosen
@@ -144,10 +140,20 @@ def _best(
 
 def _agreement(cloud: PointCloud, problem: Problem, T_base_part: Transform) -> float:
     """Return the share of the readings that agree with a placement."""
+    return agreement(_rows(cloud, problem, T_base_part), reading_weights(cloud))[0]
+
+
+def _residuals(cloud: PointCloud, problem: Problem, T_base_part: Transform) -> Array:
+    """Return the residuals (n,) of the readings that were heard, in mm, nan off the surface."""
+    rows = _rows(cloud, problem, T_base_part)
+    return np.where(rows.valid, rows.r, np.nan)[reading_weights(cloud) > 0]
+
+
+def _rows(cloud: PointCloud, problem: Problem, T_base_part: Transform) -> Rows:
     origins, distance = model_readings(cloud, problem.setup.alignment.point_model)
-    centre = problem.centre_mm(T_base_part)
-    rows = distance_rows(problem.curved, T_base_part, centre, origins, distance, cloud.beams_base)
-    return agreement(rows, reading_weights(cloud))[0]
+    return distance_rows(
+        problem.curved, T_base_part, problem.centre_mm(T_base_part), origins, distance, cloud.beams_base
+    )
 
 
 def speed_issues(found: MapFit, problem: Problem) -> list[Issue]:

@@ -8,6 +8,7 @@ import numpy as np
 
 from alignment.cloud import PointCloud
 from alignment.estimate.patches import sample_rows
+from alignment.estimate.pose_line import pose_line
 from planner.frames import Array, Transform
 from planner.probe import law_offsets_mm
 from planner.setup import Setup
@@ -18,12 +19,16 @@ TIME_SCALES = (("nanoseconds", 1e-3), ("milliseconds", 1e3), ("seconds", 1e6), (
 
 @dataclass(frozen=True)
 class Hypothesis:
-    """A wrong input: its code, the sentence about it and the remedy, and the scan as it should have been."""
+    """A wrong input: its code, the sentence about it and the remedy, and the scan as it should have been.
+
+    of_laws: it moves the laws within their poses and nothing else, so that residuals of both readings can be compared.
+    """
 
     code: str
     message: str
     remedy: str
     apply: Callable[[PointCloud], PointCloud]
+    of_laws: bool = False
 
 
 def thinned(cloud: PointCloud, size: int) -> PointCloud:
@@ -47,6 +52,7 @@ def array_hypotheses(setup: Setup) -> Iterator[Hypothesis]:
         "the readings fit the part only with the laws in reverse order.",
         f"Set probe.reversed to {str(not setup.probe.reversed).lower()}.",
         lambda c: _along(c, setup, lambda a, b: -a),
+        of_laws=True,
     )
     for sign, name in ((1.0, "+90"), (-1.0, "-90")):
         yield Hypothesis(
@@ -54,6 +60,7 @@ def array_hypotheses(setup: Setup) -> Iterator[Hypothesis]:
             f"the readings fit the part only with the array turned by {name} deg about the beam.",
             "Correct tool.array_axis, or the angle A of the taught tool.",
             partial(_quarter, setup=setup, sign=sign),
+            of_laws=True,
         )
 
 
@@ -98,9 +105,16 @@ def _along(cloud: PointCloud, setup: Setup, turned: Callable[[Array, Array], Arr
     """Return the cloud with the laws laid out along another axis through the same pose."""
     if cloud.arrays_base is None or cloud.beams_base is None:
         return cloud
-    x = law_offsets_mm(setup.probe)[cloud.law - 1][:, None]
+    offsets = law_offsets_mm(setup.probe)
+    x = offsets[cloud.law - 1][:, None]
     other = turned(cloud.arrays_base, cloud.beams_base)
-    return replace(cloud, origins_base=cloud.origins_base + x * (other - cloud.arrays_base), arrays_base=other)
+    there = replace(cloud, origins_base=cloud.origins_base + x * (other - cloud.arrays_base), arrays_base=other)
+    if not len(cloud.lost_law):
+        return there
+    # Where nothing came back the laws stand elsewhere too.
+    array = pose_line(cloud, setup.probe).array_base[cloud.lost_pose_index]
+    moved = offsets[cloud.lost_law - 1][:, None] * (turned(array, cloud.lost_beams_base) - array)
+    return replace(there, lost_origins_base=cloud.lost_origins_base + moved)
 
 
 def _quarter(cloud: PointCloud, setup: Setup, sign: float) -> PointCloud:

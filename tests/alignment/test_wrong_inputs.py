@@ -1,6 +1,7 @@
 """Wrong inputs are recognised and named, and a right one is not."""
 
 from dataclasses import replace
+from functools import partial
 
 import numpy as np
 import pytest
@@ -11,7 +12,7 @@ from planner.placement import part_from_correction
 from planner.probe import law_offsets_mm
 from planner.setup import Setup
 from tests.alignment.clouds import curved_of, normal_error_mm, scan
-from tests.loop.surfaces import ParamSurface, double_curved
+from tests.loop.surfaces import ParamSurface, double_curved, plane, wing
 
 PANEL = double_curved(400, 260, 1500, 700)
 CURVED = curved_of(PANEL, 41, 31)
@@ -46,9 +47,45 @@ def test_a_right_scan_raises_no_suspicion():
     assert normal_error_mm(PANEL, TRUE, part_from_correction(found.T_base_basecorr, CELL.T_base_partnom)) < 0.03
 
 
+REVERSED = Setup.model_validate({"probe": {"reversed": True}})
+
+
 def test_laws_in_reverse_order():
-    other = Setup.model_validate({**CELL.model_dump(), "probe": {"reversed": True}})
-    assert "laws-reversed" in codes(taken(true_setup=other))
+    assert "laws-reversed" in codes(taken(true_setup=REVERSED))
+
+
+@pytest.mark.parametrize("seed", range(2))
+def test_laws_in_reverse_order_on_a_part_so_gentle_that_they_fit_to_a_tenth(seed):
+    skin, cell = wing(300.0, chord=140.0, camber=12.0, twist_deg=4.0), Setup()
+    curved = curved_of(skin, 81, 61)
+    away = Transform.from_xyzabc("base", "basecorr", [1.2, -0.8, 0.9, 0.3, -0.2, 0.1])
+    T = part_from_correction(away, cell.T_base_partnom)
+    taken = partial(scan, skin, cell, T, u_range=(5, 295), v_values=[0.2, 0.5, 0.8])
+    right = align(taken(rng=np.random.default_rng(seed)), curved, [], cell)
+    assert [i.code for i in right.issues if i.severity != "info"] == []
+    found = align(taken(rng=np.random.default_rng(seed), true_setup=REVERSED), curved, [], cell)
+    # Nothing but the order of the laws is odd about it.
+    assert found.residual.rms_mm < 0.2
+    assert [i.code for i in found.issues if i.severity != "info"] == ["laws-reversed"]
+
+
+def test_laws_in_reverse_order_on_a_flat_plate_show_at_its_edges():
+    plate, cell = plane(200.0, 150.0), Setup()
+    curved = curved_of(plate, 9, 9)
+    # Turned in its own plane: no distance changes.
+    T = part_from_correction(
+        Transform.from_xyzabc("base", "basecorr", [0.2, -0.1, 0.1, 0.4, 0, 0]), cell.T_base_partnom
+    )
+    u, v = plate.u, plate.v
+    lines = ((u[0] - 15.0, u[1] + 15.0), np.linspace(v[0] + 35.0, v[1] - 35.0, 3))
+    taken = partial(scan, plate, cell, T, u_range=lines[0], v_values=lines[1], spacing_mm=1.0)
+    right = align(taken(rng=np.random.default_rng(3)), curved, [], cell)
+    assert right.edges["rms_mm"] < 0.1
+    assert "laws-reversed" not in {i.code for i in right.issues}
+    found = align(taken(rng=np.random.default_rng(3), true_setup=REVERSED), curved, [], cell)
+    assert found.residual.rms_mm < 0.05
+    assert found.verdict == "fail"
+    assert "laws-reversed" in {i.code for i in found.issues}
 
 
 @pytest.mark.parametrize("factor", [1e3, 1e-3])

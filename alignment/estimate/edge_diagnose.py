@@ -1,0 +1,68 @@
+"""What the crossings of edges say about a fit: edges that are not where CAD has them, and laws in another order.
+
+On a flat part the order of the laws hardly shows in the distances. At the edges it does: a law crosses where its place in the
+array says, and in the wrong order crossings at the ends of the array contradict those of the other passes.
+"""
+
+import numpy as np
+
+from alignment.cloud import PointCloud
+from alignment.estimate.hypotheses import Hypothesis
+from alignment.estimate.map import MapFit, align_map
+from alignment.estimate.problem import Problem
+from planner.issues import Issue
+
+# No robot and no beam leaves crossings this far (rms, mm) off the edges of a part that is as its CAD.
+OFF_EDGES_MM = 0.5
+# A crossing that belongs to no edge counts as this far off (mm).
+UNMATCHED_MM = 0.5
+# Crossings that lie farther off than this, all in all (rms, mm), are worth a look for what would explain them.
+SUSPICIOUS_MM = 0.1
+# Another order of laws has to leave less than this share of it, and so many crossings have to speak.
+BETTER = 0.5
+LEAST_CROSSINGS = 20
+
+
+def edge_issues(found: MapFit) -> list[Issue]:
+    """Return a warning where the placement that fits the surface best does not fit the edges that were crossed."""
+    off_mm = 0.0 if found.edges is None else found.edges["rms_mm"]
+    if off_mm <= OFF_EDGES_MM:
+        return []
+    text = (
+        f"at this placement the crossings lie {off_mm:.2f} mm rms off the CAD's edges: the part is trimmed otherwise or has "
+        "sprung back, or the clock or the laws of the scan are not as said; in the plane sigma does not hold."
+    )
+    remedy = (
+        "Look where they lie off; if the part has sprung back, run the alignment as non-rigid: it stays on the edges."
+    )
+    return [Issue("warning", "off-edges", text, remedy, "scan")]
+
+
+def order_by_edges(
+    cloud: PointCloud, problem: Problem, found: MapFit, hypotheses: list[Hypothesis]
+) -> Hypothesis | None:
+    """Return the order of laws with which the crossings lie on their edges, where with the given one they do not."""
+    off_mm = _off_edges_mm(found)
+    if off_mm <= SUSPICIOUS_MM:
+        return None
+    best, chosen = BETTER * off_mm, None
+    for hypothesis in hypotheses:
+        if not hypothesis.of_laws:
+            continue
+        other = align_map(hypothesis.apply(cloud), problem.curved, problem.setup)
+        if isinstance(other, MapFit) and other.converged and _enough(other) and _off_edges_mm(other) < best:
+            best, chosen = _off_edges_mm(other), hypothesis
+    return chosen
+
+
+def _enough(found: MapFit) -> bool:
+    return found.edges is not None and found.edges["used"] >= LEAST_CROSSINGS
+
+
+def _off_edges_mm(found: MapFit) -> float:
+    """Return how far all crossings lie off their edges (rms, mm), those without an edge included; 0 without crossings."""
+    if found.edges is None or found.edges["crossings"] == 0:
+        return 0.0
+    share = found.edges["used"] / found.edges["crossings"]
+    squares = share * min(found.edges["rms_mm"], UNMATCHED_MM) ** 2 + (1.0 - share) * UNMATCHED_MM**2
+    return float(np.sqrt(squares))
