@@ -6,6 +6,7 @@ from planner.errors import EchoBaseError, fail
 from planner.frames import Array
 from planner.keypoint import KeyPoint
 from planner.path.axes import ScanAxes, raster_axes
+from planner.path.bands import beside, passes_allowed
 from planner.path.crossings import (
     PATCH_MM,
     PATCH_SIGMA_MM,
@@ -20,6 +21,7 @@ from planner.path.cut import tangent
 from planner.path.ends import Run, finished, outside, overrun
 from planner.path.links import with_links
 from planner.path.mesh import PathMesh
+from planner.path.oppose import opposed
 from planner.path.order import nearest_order
 from planner.path.passes import assemble, headings
 from planner.path.raster import acquisition_spacing_mm
@@ -42,9 +44,10 @@ def alignment_path(curved: CurvedSurface, keypoints: tuple[KeyPoint, ...], setup
     """Return the dense alignment path (kind `alignment`, at `alignment_standoff_mm`) through all key points.
 
     Each pass is a plane section of the surface, so it follows it; where the way turns at a key point a new pass begins,
-    for the array turns with the travel. Suggested key points keep to their strips, others are visited by a short tour. A
-    pass that ends near an edge goes on to it: with `alignment.edges` across it by `edge_overrun_mm`, data on (face -1, on
-    the surface's continuation), wherever the part ends there; elsewhere, and without, up to the edge margin. With
+    for the array turns with the travel. Suggested key points keep to their strips, which narrow probes run several times
+    side by side (`bands`); others are visited by a short tour. A pass that ends near an edge goes on to it: with
+    `alignment.edges` across it by `edge_overrun_mm`, data on (face -1, on the surface's continuation), wherever the part
+    ends there; elsewhere, and without, up to the edge margin. With
     `alignment.edges` crossings are added until the edges on all sides are crossed and all six directions can be found.
     Passes are interrupted at keep-out regions, and edges under them are not crossed.
     Raises `EchoBaseError` where no line over the surface joins two key points.
@@ -64,10 +67,15 @@ def passes_through(curved: CurvedSurface, keypoints: tuple[KeyPoint, ...], setup
     on_mesh = np.einsum("nk,nkj->nj", foot.bary, mesh.vertices[mesh.faces[foot.face]])
     edges = usable_rim(curved.surface, _RIM_SPACING_MM, setup)
     keep = keep_outs_of(curved.surface, setup)
-    runs: list[Run] = []
-    for members in strokes_through(keypoints, foot.points):
-        strokes = _lines(curved, mesh, on_mesh[members], foot.normals[members], axes)
-        runs += [finished(mesh, stroke, edges, setup) for stroke in strokes]
+    strips, others = strokes_through(keypoints, foot.points)
+    strokes = [_lines(curved, mesh, on_mesh[rows_], foot.normals[rows_], axes) for rows_ in strips + others]
+    runs = [finished(mesh, stroke, edges, setup) for some in strokes for stroke in some]
+    of_strips = sum(len(some) for some in strokes[: len(strips)])
+    count = passes_allowed(curved, setup, sum(run.s1 - run.s0 for run in runs[:of_strips]))
+    if count > 1:
+        for members in strips:
+            more = beside(curved, mesh, on_mesh[members], foot.normals[members], count, setup)
+            runs += [finished(mesh, stroke, edges, setup) for stroke in more]
     runs = outside(mesh, runs, keep)
     if setup.alignment.edges:
         extra = _crossings(curved, mesh, runs, edges, axes, setup)
@@ -80,7 +88,7 @@ def passes_through(curved: CurvedSurface, keypoints: tuple[KeyPoint, ...], setup
             "keypoints",
         )
     expect_sensible(sum(run.s1 - run.s0 for run in runs), setup)
-    return _path(curved, mesh, runs, setup)
+    return _path(curved, mesh, runs, edges, setup)
 
 
 def expect_sensible(length_mm: float, setup: Setup) -> None:
@@ -114,13 +122,7 @@ def _crossings(
 ) -> list[Run]:
     """Return short extra passes across edges that nothing crosses yet and that the estimate needs."""
     centre = curved.surface.centroid_part
-    precision = prior_precision(setup)
-    for run in runs:
-        s = np.arange(run.s0, run.s1, PATCH_MM)
-        _, bary, face = positions(mesh, run.line, s)
-        p, n = curved.evaluate(face.astype(np.int32), bary)
-        j = rows(p, n, centre) / PATCH_SIGMA_MM
-        precision = precision + j.T @ j
+    precision = _precision(curved, mesh, runs, centre, setup)
     crossed = [run.rim_at(edges, end) for run in runs for end in run.over]
     if crossed:
         j = edge_rows(edges.points[crossed], edges.conormals[crossed], edges.along[crossed], centre, setup).reshape(
@@ -134,6 +136,18 @@ def _crossings(
         if extra is not None:
             out.append(extra)
     return out
+
+
+def _precision(curved: CurvedSurface, mesh: PathMesh, runs: list[Run], centre: Array, setup: Setup) -> Array:
+    """Return the precision (6, 6) of a motion about `centre`: of the fixture, and of the surface under the runs."""
+    precision = prior_precision(setup)
+    for run in runs:
+        s = np.arange(run.s0, run.s1, PATCH_MM)
+        _, bary, face = positions(mesh, run.line, s)
+        p, n = curved.evaluate(face.astype(np.int32), bary)
+        j = rows(p, n, centre) / PATCH_SIGMA_MM
+        precision = precision + j.T @ j
+    return precision
 
 
 def _crossing(curved: CurvedSurface, mesh: PathMesh, edges: Rim, k: int, setup: Setup) -> Run | None:
@@ -151,17 +165,21 @@ def _crossing(curved: CurvedSurface, mesh: PathMesh, edges: Rim, k: int, setup: 
     return run if run.over else None
 
 
-def _path(curved: CurvedSurface, mesh: PathMesh, runs: list[Run], setup: Setup) -> ToolPath:
+def _path(curved: CurvedSurface, mesh: PathMesh, runs: list[Run], edges: Rim, setup: Setup) -> ToolPath:
     spacing = acquisition_spacing_mm(setup)
     lengths = measure(mesh, together([Stroke(r.line, r.s0, r.s1, 0.0) for r in runs]))
     s0, s1 = np.array([r.s0 for r in runs]), np.array([r.s1 for r in runs])
     track = resample(lengths, np.arange(len(runs)), s0, s1, np.zeros(len(runs), dtype=bool), spacing)
     first, last = track.bounds()
     order, flip = nearest_order(track.points[first], track.points[last])
+    runs = [runs[k] for k in order]
+    if setup.alignment.edges:
+        centre = curved.surface.centroid_part
+        flip = opposed(runs, flip, edges, _precision(curved, mesh, runs, centre, setup), centre, setup)
     track = track.arranged(order, flip)
     points, normals = curved.evaluate(track.face, track.bary)
     travel = tangent(along_track(track, points, spacing), normals)
-    over = [tuple(sorted(1 - end if flip[i] else end for end in runs[k].over)) for i, k in enumerate(order)]
+    over = [tuple(sorted(1 - end if flip[i] else end for end in run.over)) for i, run in enumerate(runs)]
     data = overrun(
         points, normals, travel, curved.surface.part_faces[track.face], track.bary, track.run, over, setup, spacing
     )

@@ -6,6 +6,7 @@ from planner.errors import EchoBaseError
 from planner.issues import Issue
 from planner.keypoint import KeyPoint
 from planner.path.mesh import PathMesh
+from planner.path.places import flat_radius_mm, too_curved
 from planner.path.suggest import suggest
 from planner.setup import Setup
 from planner.surface.closest import Foot
@@ -70,7 +71,7 @@ def verdicts(curved: CurvedSurface, keypoints: tuple[KeyPoint, ...], setup: Setu
     edge = PathMesh.of(curved.surface).boundary_distance(foot.points, radius)
     bend = np.abs(np.linalg.eigvalsh(curved.shape_operator(foot.face, foot.bary))).max(axis=1)
     offset = bend * radius**2 / 4.0
-    turned = np.cos(np.minimum(bend * radius, np.pi)) < setup.alignment.min_normal_dot
+    curved_there = too_curved(bend, setup)
     out: list[Issue] = kept_out(curved, keypoints, setup)
     for i, k in enumerate(keypoints):
         where = f"keypoints: {k.id}"
@@ -95,14 +96,15 @@ def verdicts(curved: CurvedSurface, keypoints: tuple[KeyPoint, ...], setup: Setu
                     where,
                 )
             )
-        if offset[i] > setup.tolerances.position_mm or turned[i]:
+        if curved_there[i]:
             out.append(
                 Issue(
                     "warning",
                     "keypoint-curved",
                     f"At key point {k.id} the surface (radius {1.0 / max(bend[i], 1e-9):.0f} mm) leaves a plane by "
                     f"{offset[i]:.2f} mm on average within {radius:g} mm.",
-                    "Move it to a flatter place, or give a smaller alignment.search_radius_mm.",
+                    "Move it to a flatter place, or give an alignment.search_radius_mm of at most "
+                    f"{np.floor(10.0 * flat_radius_mm(float(bend[i]), setup)) / 10.0:g} mm.",
                     where,
                 )
             )

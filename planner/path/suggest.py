@@ -1,44 +1,34 @@
 """Key points suggested: on strips that cover what was asked and tell most about where the part is."""
 
-from dataclasses import dataclass, replace
+from dataclasses import replace
 
 import numpy as np
 
-from planner.errors import fail
+from planner.errors import EchoBaseError, fail
 from planner.frames import Array
 from planner.keypoint import KeyPoint
 from planner.path.alignment import expect_sensible, passes_through
 from planner.path.axes import ScanAxes, raster_axes
+from planner.path.bands import band_passes
 from planner.path.coverage import swept_share
 from planner.path.crossings import PATCH_MM, PATCH_SIGMA_MM, prior_precision, rows
 from planner.path.ends import EDGE_REACH_MM
 from planner.path.mesh import PathMesh
+from planner.path.places import ALONG_INSET, APART, EDGE_ROOM, Strip, places
 from planner.path.sampling import sample_equal_area
-from planner.path.section import Stroke, positions, whole_lines
+from planner.path.section import positions, whole_lines
 from planner.path.tour import strip_id
 from planner.setup import Setup
 from planner.surface.curved import CurvedSurface
-from planner.surface.keepouts import keep_outs_of
 
 _SHARES = (0.35, 0.5, 0.65)
 _CLOSE_ENOUGH = 0.01
 _ROUNDS = 8
 _POINTS_WANTED = 12
-_APART_MM = 8.0
-# Different for the two families, or the points of crossing strips would meet near the corners.
-_ALONG_INSET, _ACROSS_INSET = 1.2, 1.8
-
-
-@dataclass(frozen=True, eq=False)
-class _Strip:
-    """A stretch s0..s1 of a line over the surface; free: which ends (first, last) go on to the boundary; inset: how many
-    search radii its points keep from there."""
-
-    stroke: Stroke
-    s0: float
-    s1: float
-    free: tuple[bool, bool]
-    inset: float = _ALONG_INSET
+# Strips that lie along the very rim join nothing: tried again with this much less of them.
+_NUDGE = 0.97
+# Another than along, or the points of crossing strips would meet near the corners.
+_ACROSS_INSET = 1.8
 
 
 def suggest(curved: CurvedSurface, setup: Setup, seed: int = 0) -> tuple[KeyPoint, ...]:
@@ -52,12 +42,13 @@ def suggest(curved: CurvedSurface, setup: Setup, seed: int = 0) -> tuple[KeyPoin
     mesh = PathMesh.of(curved.surface)
     axes = raster_axes(curved, setup)
     asked = setup.alignment.coverage
-    length = asked * curved.surface.area_mm2 / setup.probe.swath_mm
-    expect_sensible(length, setup)
+    width = band_passes(curved, setup) * setup.probe.swath_mm
+    length = asked * curved.surface.area_mm2 / width
+    expect_sensible(asked * curved.surface.area_mm2 / setup.probe.swath_mm, setup)
     shift = float(np.random.default_rng(seed).uniform(-0.2, 0.2)) if seed else 0.0
     ranked = []
     for share in _SHARES:
-        strips = _strips(mesh, axes, share, length, setup, shift)
+        strips = _strips(mesh, axes, share, length, width, setup, shift)
         if strips:
             ranked.append((_largest_error(curved, mesh, strips, setup), share))
     if not ranked:
@@ -68,10 +59,13 @@ def suggest(curved: CurvedSurface, setup: Setup, seed: int = 0) -> tuple[KeyPoin
     best: tuple[float, tuple[KeyPoint, ...]] = (np.inf, ())
     tried: list[tuple[float, float]] = []
     for _ in range(_ROUNDS):
-        strips = _strips(mesh, axes, share, length, setup, shift)
+        strips = _strips(mesh, axes, share, length, width, setup, shift)
         points = _keypoints(curved, mesh, strips, setup) if strips else ()
+        got = _covered(curved, points, setup)
+        if got is None:
+            length *= _NUDGE
+            continue
         if points:
-            got = swept_share(curved, passes_through(curved, points, setup), setup)
             tried.append((length, got))
             if abs(got - asked) < best[0]:
                 best = (abs(got - asked), points)
@@ -85,6 +79,18 @@ def suggest(curved: CurvedSurface, setup: Setup, seed: int = 0) -> tuple[KeyPoin
     return best[1]
 
 
+def _covered(curved: CurvedSurface, points: tuple[KeyPoint, ...], setup: Setup) -> float | None:
+    """Return the share that the passes through key points cover; None where no line joins two of them."""
+    if not points:
+        return 0.0
+    try:
+        return swept_share(curved, passes_through(curved, points, setup), setup)
+    except EchoBaseError as error:
+        if error.issues[0].code == "section-missing":
+            return None
+        raise
+
+
 def _next_length(tried: list[tuple[float, float]], length: float, asked: float) -> float:
     """Return the strip length to try next: between the nearest below and above, or in proportion."""
     below = [t for t in tried if t[1] <= asked]
@@ -96,22 +102,25 @@ def _next_length(tried: list[tuple[float, float]], length: float, asked: float) 
     return length * float(np.clip(asked / max(tried[-1][1], 1e-3), 0.5, 2.0)) if tried else length * 1.5
 
 
-def _strips(mesh: PathMesh, axes: ScanAxes, share: float, length: float, setup: Setup, shift: float) -> list[_Strip]:
+def _strips(
+    mesh: PathMesh, axes: ScanAxes, share: float, length: float, width: float, setup: Setup, shift: float
+) -> list[Strip]:
     """Return strips of about this total length, `share` of it along the surface, the rest across."""
-    out: list[_Strip] = []
-    for side, part, inset in ((axes.across, share, _ALONG_INSET), (axes.along, 1.0 - share, _ACROSS_INSET)):
-        out += [replace(s, inset=inset) for s in _family(mesh, side, part * length, setup, shift)]
+    out: list[Strip] = []
+    for side, part, inset in ((axes.across, share, ALONG_INSET), (axes.along, 1.0 - share, _ACROSS_INSET)):
+        out += [replace(s, inset=inset) for s in _family(mesh, side, part * length, width, setup, shift)]
     return out
 
 
-def _family(mesh: PathMesh, side: Array, length: float, setup: Setup, shift: float) -> list[_Strip]:
+def _family(mesh: PathMesh, side: Array, length: float, width: float, setup: Setup, shift: float) -> list[Strip]:
     used = (mesh.vertices @ side)[mesh.faces]
     lo, hi = float(used.min()), float(used.max())
     probe = whole_lines(mesh, side, lo + (hi - lo) * np.linspace(0.15, 0.85, 7))
     # Round a loop a strip goes less than half way, so that its two ends say which way.
     usable = [0.45 * s.length if s.loop else s.length for s in probe]
     typical = float(np.median(usable))
-    least = min(2.0 * setup.alignment.search_radius_mm, 0.45 * typical)
+    # Two points apart from each other and off the edge.
+    least = min(1.1 * (EDGE_ROOM + APART) * setup.alignment.search_radius_mm, 0.75 * typical)
     count = int(np.ceil(length / typical - 0.05))
     if count < 2:
         count = 2 if length / 2.0 >= least else 1
@@ -119,7 +128,7 @@ def _family(mesh: PathMesh, side: Array, length: float, setup: Setup, shift: flo
     inset = 0.5 / count
     if count <= 3:
         inset = min(inset, 0.2)
-    off = max(0.6 * setup.probe.swath_mm, 1.1 * setup.alignment.search_radius_mm)
+    off = max(0.6 * width, 1.1 * setup.alignment.search_radius_mm)
     inset = min(max(inset, off / max(hi - lo, 1e-9)), 0.45)
     at = np.linspace(inset, 1.0 - inset, count) if count > 1 else np.array([0.5])
     at = np.clip(at + shift * (at[1] - at[0] if count > 1 else 0.5), 0.5 * inset, 1.0 - 0.5 * inset)
@@ -128,17 +137,17 @@ def _family(mesh: PathMesh, side: Array, length: float, setup: Setup, shift: flo
         span = part * stroke.length * (0.45 if stroke.loop else 1.0)
         if stroke.loop:
             start = 0.5 * stroke.length * (i % 2)
-            out.append(_Strip(stroke, start, start + span, (False, False)))
+            out.append(Strip(stroke, start, start + span, (False, False)))
         elif part > 0.95 or stroke.length - span < min(EDGE_REACH_MM, stroke.length / 3.0):
-            out.append(_Strip(stroke, 0.0, stroke.length, (True, True)))
+            out.append(Strip(stroke, 0.0, stroke.length, (True, True)))
         elif i % 2 == 0:
-            out.append(_Strip(stroke, 0.0, span, (True, False)))
+            out.append(Strip(stroke, 0.0, span, (True, False)))
         else:
-            out.append(_Strip(stroke, stroke.length - span, stroke.length, (False, True)))
+            out.append(Strip(stroke, stroke.length - span, stroke.length, (False, True)))
     return out
 
 
-def _largest_error(curved: CurvedSurface, mesh: PathMesh, strips: list[_Strip], setup: Setup) -> float:
+def _largest_error(curved: CurvedSurface, mesh: PathMesh, strips: list[Strip], setup: Setup) -> float:
     """Return the largest normal error over the surface (mm, one sigma) predicted for a scan of these strips."""
     centre = curved.surface.centroid_part
     precision = prior_precision(setup)
@@ -153,50 +162,10 @@ def _largest_error(curved: CurvedSurface, mesh: PathMesh, strips: list[_Strip], 
     return float(np.round(np.sqrt(np.einsum("ni,ij,nj->n", g, np.linalg.inv(precision), g).max()), 9))
 
 
-def _keypoints(curved: CurvedSurface, mesh: PathMesh, strips: list[_Strip], setup: Setup) -> tuple[KeyPoint, ...]:
+def _keypoints(curved: CurvedSurface, mesh: PathMesh, strips: list[Strip], setup: Setup) -> tuple[KeyPoint, ...]:
     each = int(np.clip(np.ceil(_POINTS_WANTED / len(strips)), 2, 4))
-    out = []
-    for number, strip in enumerate(strips, start=1):
-        s = _places(curved, mesh, strip, each, setup)
-        _, bary, face = positions(mesh, strip.stroke.line, s)
-        points, _ = curved.evaluate(face.astype(np.int32), bary)
-        out += [
-            KeyPoint(id=strip_id(number, i), x_mm=float(p[0]), y_mm=float(p[1]), z_mm=float(p[2]))
-            for i, p in enumerate(points, start=1)
-        ]
-    return tuple(out)
-
-
-def _places(curved: CurvedSurface, mesh: PathMesh, strip: _Strip, count: int, setup: Setup) -> Array:
-    """Return where on the strip its key points stand: off the edges by their search radius, off curved places, and never
-    in a keep-out."""
-    radius = setup.alignment.search_radius_mm
-    span = strip.s1 - strip.s0
-    off = min(strip.inset * radius, max(0.45 * span, span - _APART_MM), 0.9 * EDGE_REACH_MM)
-    a = strip.s0 + (off if strip.free[0] else 0.0)
-    b = strip.s1 - (off if strip.free[1] else 0.0)
-    count = int(np.clip(1 + (b - a) // (2.0 * radius), 2, count))
-    want = np.linspace(a, b, count)
-    keep = keep_outs_of(curved.surface, setup)
-    if b - a < 4.0 * radius and not len(keep):
-        return want
-    fine = np.linspace(a, b, 81)
-    on_line, bary, face = positions(mesh, strip.stroke.line, fine)
-    room = keep.room_mm(on_line)
-    clear = ~(mesh.boundary_distance(on_line, radius) < radius) & (room >= radius)
-    bend = np.abs(np.linalg.eigvalsh(curved.shape_operator(face.astype(np.int32), bary))).max(axis=1)
-    fixed = (not strip.free[0], not strip.free[1])
-    kept = np.zeros(count, dtype=bool)
-    for i in range(count):
-        near = np.flatnonzero(np.abs(fine - want[i]) <= 0.15 * (b - a))
-        here = near[np.abs(fine[near] - want[i]).argmin()]
-        stays = (i == 0 and fixed[0]) or (i == count - 1 and fixed[1]) or b - a < 4.0 * radius
-        if stays and room[here] >= 0.0:
-            continue
-        good = near[(bend[near] * radius**2 / 4.0 <= setup.tolerances.position_mm) & clear[near]]
-        worse = bend + ~clear + 1e6 * (room < 0.0)
-        pick = good[np.abs(fine[good] - want[i]).argmin()] if len(good) else near[worse[near].argmin()]
-        kept[i] = room[pick] < 0.0
-        if not (len(good) and abs(fine[pick] - want[i]) < (b - a) / 80.0):
-            want[i] = fine[pick]
-    return np.asarray(want[~kept])
+    return tuple(
+        KeyPoint(id=strip_id(number, i), x_mm=float(p[0]), y_mm=float(p[1]), z_mm=float(p[2]))
+        for number, points in enumerate(places(curved, mesh, strips, each, setup), start=1)
+        for i, p in enumerate(points, start=1)
+    )

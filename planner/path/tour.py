@@ -16,8 +16,8 @@ def strip_id(strip: int, number: int) -> str:
     return f"S{strip}.{number}"
 
 
-def strokes_through(keypoints: tuple[KeyPoint, ...], points: Array) -> list[list[int]]:
-    """Return the rows of key points that each pass runs through, in order of travel.
+def strokes_through(keypoints: tuple[KeyPoint, ...], points: Array) -> tuple[list[list[int]], list[list[int]]]:
+    """Return the rows of key points that each pass runs through, in order of travel: of strips, and of all others.
 
     Key points named by `strip_id` keep to their strip; all others, and those left alone on theirs, are visited by one
     short open tour, a pass from each to the next.
@@ -37,9 +37,7 @@ def strokes_through(keypoints: tuple[KeyPoint, ...], points: Array) -> list[list
         else:
             loose.append(members[0][1])
     tour = [loose[i] for i in short_tour(points[loose])] if loose else []
-    if len(tour) == 1:
-        out.append(tour)
-    return out + [[a, b] for a, b in pairwise(tour)]
+    return out, [tour] if len(tour) == 1 else [[a, b] for a, b in pairwise(tour)]
 
 
 def short_tour(points: Array) -> list[int]:

@@ -131,10 +131,11 @@ def test_array_lies_across_the_travel_and_standoff_is_that_of_the_alignment() ->
 
 
 def test_ways_between_passes_keep_off_the_part() -> None:
-    """Strips all round a tube, outside and across its axis: no way between them comes nearer than half the clearance."""
-    panel = tube(180, 60)
-    curved = curved_of(panel)
-    path = alignment_path(curved, suggest(curved, Setup()), Setup())
+    """Strips all round a tube, on opposite sides of it: no way between them comes nearer than half the clearance."""
+    curved = curved_of(tube(180, 60))
+    at = [(x, 100 * np.cos(a), 100 * np.sin(a)) for a in np.radians([0.0, 180.0, 75.0]) for x in (60.0, 340.0)]
+    keys = tuple(KeyPoint(id=f"S{i // 2 + 1}.{i % 2 + 1}", x_mm=x, y_mm=y, z_mm=z) for i, (x, y, z) in enumerate(at))
+    path = alignment_path(curved, keys, NO_EDGES)
     assert (path.role == Role.LINK).any()
     xyz = path.Ts_part_tcp.xyz_mm
     travel = np.flatnonzero(np.isin(path.role[:-1], [Role.RETRACT, Role.LINK]))

@@ -4,8 +4,9 @@ from itertools import product
 
 import numpy as np
 import pytest
+from scipy.spatial.distance import pdist
 
-from benchmarks.planning.panels import panels, tube
+from benchmarks.planning.panels import Panel, panels, tube
 from planner.errors import EchoBaseError
 from planner.keypoint import KeyPoint
 from planner.path.alignment import alignment_path
@@ -62,8 +63,11 @@ def test_curvature_is_judged_by_the_search_radius() -> None:
     at = [(x, 100 * np.cos(a), 100 * np.sin(a)) for x, a in ((100, 0.0), (200, 0.6), (300, 0.0))]
     found = codes(*at, panel=tube(360, 60))
     assert set(found.values()) == {"keypoint-curved"}
-    small = Setup.model_validate({"alignment": {"search_radius_mm": 5.0}})
-    assert codes(*at, panel=tube(360, 60), setup=small) == {}
+    (first, *_) = verdicts(curved_of(tube(360, 60)), points(*at), Setup())
+    assert "search_radius_mm of at most 6.3" in first.remedy
+    for radius, bad in ((6.2, False), (6.5, True)):
+        small = Setup.model_validate({"alignment": {"search_radius_mm": radius}})
+        assert bool(codes(*at, panel=tube(360, 60), setup=small)) == bad
 
 
 CELLS = {
@@ -101,6 +105,65 @@ def test_suggested_points_of_a_plate_keep_off_edges_and_corners() -> None:
     assert xyz[:, 1].max() <= 90.0
     # Spread: they reach all quarters of the plate.
     assert len({(x > 75, y > 50) for x, y, _ in xyz}) == 4
+
+
+def cap(radius: float, reach: float) -> Panel:
+    """The cap of a sphere of this radius, `reach` mm out from its top: 96 triangles round."""
+    ring = np.linspace(0.0, 2.0 * np.pi, 96, endpoint=False)
+    out = np.linspace(0.0, reach, 40)[1:, None]
+    x, y = (out * np.cos(ring)).ravel(), (out * np.sin(ring)).ravel()
+    v = np.vstack([[0.0, 0.0, radius], np.column_stack([x, y, np.sqrt(radius**2 - x**2 - y**2)])])
+    j, k = np.arange(96), (np.arange(96) + 1) % 96
+    faces = [np.column_stack([np.zeros(96, dtype=int), 1 + j, 1 + k])]
+    for i in range(38):
+        a, b = 1 + 96 * i + j, 1 + 96 * i + k
+        faces += [np.column_stack([a, a + 96, b + 96]), np.column_stack([a, b + 96, b])]
+    return Panel("cap", v, np.vstack(faces), lambda p: p / np.linalg.norm(p, axis=1, keepdims=True))
+
+
+PROBES = {
+    "array": {},
+    "crystal": {"probe": {"elements": 1}, "inspection": {"step_mm": 2.0}},
+    "crystal of 6 mm": {"probe": {"elements": 1, "beam_width_mm": 6.0}, "inspection": {"step_mm": 4.0}},
+    "short array": {"probe": {"elements": 16, "aperture_elements": 4}},
+}
+
+
+@pytest.mark.parametrize("share", [0.1, 0.25])
+@pytest.mark.parametrize(("name", "cell"), [*product(["cap", "plate", "L", "two holes"], PROBES)])
+def test_suggested_points_are_few_apart_and_draw_no_warnings(name: str, cell: str, share: float) -> None:
+    """Whatever the width of the beam: a crystal runs several passes side by side through as many points as an array."""
+    setup = Setup.model_validate({**PROBES[cell], "alignment": {"coverage": share}})
+    panel = {"cap": cap(400.0, 150.0), "plate": plate(), "L": ell()}.get(name) or SMALL[name]
+    curved = curved_of(panel, setup)
+    chosen = suggest(curved, setup)
+    assert verdicts(curved, chosen, setup) == []
+    assert 4 <= len(chosen) <= 36
+    assert pdist([k.xyz() for k in chosen]).min() > setup.alignment.search_radius_mm
+    path = alignment_path(curved, chosen, setup)
+    # The least there is: two strips of two points, 23 mm long, 30 mm wide, on a small plate.
+    assert coverage(curved, path, setup).share == pytest.approx(share, abs=0.035)
+
+
+def test_a_crystal_fills_the_search_volume_of_its_key_points() -> None:
+    """Readings around each suggested point lie in a plane, not on a line: they fix the normal the method compares."""
+    setup = Setup.model_validate(PROBES["crystal"])
+    curved = curved_of(cap(400.0, 150.0), setup)
+    chosen = suggest(curved, setup)
+    path = alignment_path(curved, chosen, setup)
+    data = path.Ts_part_contact.xyz_mm[path.is_data]
+    for k in chosen:
+        near = data[np.linalg.norm(data - k.xyz(), axis=1) <= setup.alignment.search_radius_mm]
+        assert np.linalg.svd(near - near.mean(axis=0), compute_uv=False)[1] / np.sqrt(len(near)) > 2.0
+
+
+def test_on_a_part_hardly_larger_than_the_probe_points_still_stand_apart() -> None:
+    for cell in PROBES.values():
+        setup = Setup.model_validate(cell)
+        curved = curved_of(plate(60.0, 40.0), setup)
+        chosen = suggest(curved, setup)
+        assert len(chosen) >= 3
+        assert verdicts(curved, chosen, setup) == []
 
 
 def test_another_seed_gives_other_points() -> None:
