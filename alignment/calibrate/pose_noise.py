@@ -10,7 +10,7 @@ from scipy.optimize import minimize, minimize_scalar
 
 from planner.frames import Array
 
-MOST_STATIONS = 160
+MOST_STATIONS = 320
 # A turn of the wrist by one radian makes the robot's error as new as a move of this many mm.
 LEVER_MM = 100.0
 # A step this many times the usual one begins another pass, whose errors may be new.
@@ -69,11 +69,13 @@ def stations(rotation: Array, origin_base: Array) -> Stations:
         if (step > 1e-6).any()
         else 0 * path
     )
-    width = 0.5
-    station = np.unique(np.floor(path / width), return_inverse=True)[1].ravel()
-    while station.max() >= MOST_STATIONS:
+    # One station never holds poses of two passes: their errors are not one.
+    start = np.unique(run, return_index=True)[1]
+    within = path - path[start][run]
+    width, station = 0.5, _stations(run, within, 0.5)
+    while station.max() >= max(MOST_STATIONS, len(start)):
         width *= 1.3
-        station = np.unique(np.floor(path / width), return_inverse=True)[1].ravel()
+        station = _stations(run, within, width)
     first = np.unique(station, return_index=True)[1]
     # The pose in the middle of each station stands for it.
     middle = first + (np.bincount(station) - 1) // 2
@@ -85,6 +87,12 @@ def stations(rotation: Array, origin_base: Array) -> Stations:
     way = np.abs(s[:, None] - s[None])
     same = run[middle][:, None] == run[middle][None]
     return Stations(station, {"path": way, "passes": np.where(same, way, FAR_MM), "space": air})
+
+
+def _stations(run: NDArray[np.int64], within_mm: Array, width_mm: float) -> NDArray[np.int64]:
+    """Return the station of each pose (m,): a run, and a stretch of it."""
+    stretch = np.floor(within_mm / width_mm).astype(np.int64)
+    return np.asarray(np.unique(run * (stretch.max() + 1) + stretch, return_inverse=True)[1].ravel())
 
 
 # Of n readings: station (n,), derivatives by the pose's error (n, 3), by the unknown beside the residual (n, p + 1).

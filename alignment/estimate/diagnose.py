@@ -4,7 +4,6 @@ import numpy as np
 
 from alignment.cloud import PointCloud
 from alignment.estimate.capture import Captured, capture
-from alignment.estimate.consensus import agreement
 from alignment.estimate.contest import fits_better
 from alignment.estimate.edge_diagnose import edge_issues, order_by_edges
 from alignment.estimate.hypotheses import Hypothesis, array_hypotheses, place_hypotheses, thinned
@@ -24,8 +23,6 @@ FITS_SHARE = 0.6
 FITS_MM = 0.4
 # Another explanation has to be this much better than the given one.
 BETTER = 0.5
-# Or it fits at least as well, and so much more of the scan agrees with it: the rest of the given one may be called outliers.
-MORE_AGREE = 0.1
 # Of a scan that fits far from nominal, one that fits nearly as well and near is the likelier.
 NEARLY = 2.5
 # Farther than this from nominal, in standard deviations of the fixture, is no explanation.
@@ -35,6 +32,8 @@ SUSPICIOUS_MM = 0.3
 SUSPICIOUS_SHARE = 0.5
 # Change of the speed of sound that is worth a word: two degrees of water.
 SPEED_SHARE = 0.004
+# More than this is no couplant of ultrasound, and a speed that is wrong explains at least so much of the misfit.
+MOST_SPEED_SHARE, EXPLAINED = 0.5, 0.6
 # Standoffs that differ by less than this, beyond what a misplaced part makes of one, tell nothing about it (mm rms).
 LEAST_STANDOFF_SPREAD_MM = 1.0
 CHORD_MM, CHORD_DEG = 0.01, 0.1
@@ -109,11 +108,9 @@ def _best(
     """Return the hypothesis that fits best, if it fits well and clearly better than the scan as given.
 
     far: the scan as given fits, but far from nominal; then one that fits as well and near counts too. T_base_part: where the
-    scan as given puts the part; then one that fits better, and that clearly more of the readings agree with, counts too, and
-    another order of laws that fits better all along the scan.
+    scan as given puts the part; then another order of laws that fits better all along the scan counts too.
     """
     small = thinned(cloud, SAMPLE)
-    agrees = np.inf if T_base_part is None else _agreement(small, problem, T_base_part)
     given = capture(small, problem) if T_base_part is not None else None
     best, chosen = np.inf, None
     for hypothesis in hypotheses:
@@ -127,8 +124,6 @@ def _best(
             continue
         near = far and away < 2.0
         wanted = NEARLY * scatter_mm if near else BETTER * scatter_mm
-        if not near and _agreement(other, problem, found.T_base_part) > agrees + MORE_AGREE:
-            wanted = scatter_mm
         if given is not None and hypothesis.of_laws and found.scatter_mm >= wanted:
             as_given = _residuals(small, problem, given.T_base_part)
             if fits_better(as_given, _residuals(other, problem, found.T_base_part), found.scatter_mm):
@@ -136,11 +131,6 @@ def _best(
         if found.scatter_mm < min(best, wanted):
             best, chosen = found.scatter_mm, hypothesis
     return chosen
-
-
-def _agreement(cloud: PointCloud, problem: Problem, T_base_part: Transform) -> float:
-    """Return the share of the readings that agree with a placement."""
-    return agreement(_rows(cloud, problem, T_base_part), reading_weights(cloud))[0]
 
 
 def _residuals(cloud: PointCloud, problem: Problem, T_base_part: Transform) -> Array:
@@ -176,7 +166,10 @@ def speed_issues(found: MapFit, problem: Problem) -> list[Issue]:
     information = x.T @ x / variance + np.diag(np.r_[np.ones(6), 1e-6])
     scale = -np.linalg.solve(information, x.T @ r / variance)[6]
     deviation = float(np.sqrt(np.linalg.inv(information)[6, 6]))
-    if abs(scale) < max(SPEED_SHARE, 4.0 * deviation):
+    plain = r - design @ np.linalg.lstsq(design, r, rcond=None)[0]
+    # A part that is not as its CAD has distances of its own, which no speed explains: then r is d, or little is explained.
+    explained = abs(scale) < MOST_SPEED_SHARE and mad_sigma(left, 0.0) < EXPLAINED * mad_sigma(plain, 0.0)
+    if not explained or abs(scale) < max(SPEED_SHARE, 4.0 * deviation):
         return []
     speed = sound_speed_m_s(problem.setup.couplant) * (1.0 + scale)
     return [
