@@ -1,20 +1,16 @@
 """Least squares whose readings share the errors of a robot that is off by hundredths, and stays off for centimetres."""
 
-from collections.abc import Iterator
 from dataclasses import dataclass, replace
+from itertools import product
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.linalg import cholesky, solve_triangular
+from scipy.linalg import cho_solve_banded, cholesky, cholesky_banded, solve_triangular
 from scipy.optimize import minimize, minimize_scalar
 
+from alignment.calibrate.stations import Stations
 from planner.frames import Array
 
-MOST_STATIONS = 320
-# A turn of the wrist by one radian makes the robot's error as new as a move of this many mm.
-LEVER_MM = 100.0
-# A step this many times the usual one begins another pass, whose errors may be new.
-JUMP, FAR_MM = 4.0, 1e6
 LENGTHS_MM = (3.0, 10.0, 30.0, 100.0)
 # Below these (mm, dB, mm) no cell is; above the others no robot.
 FLOOR = {"distance": 5e-4, "level": 5e-3, "pose": 1e-4}
@@ -24,21 +20,6 @@ CEILING = 2.0
 UNLIKELY = 0.05
 IMPOSSIBLE = 1e12
 COARSE = {"xatol": 0.05}
-
-
-@dataclass(frozen=True, eq=False)
-class Stations:
-    """Poses near each other, between which the robot's error hardly changes.
-
-    of_pose (m,): station of each pose. apart: distances (s, s) between stations, mm: along the way recorded ("path"), the
-    same but far between passes ("passes"), and through the air ("space").
-    """
-
-    of_pose: NDArray[np.int64]
-    apart: dict[str, Array]
-
-    def __len__(self) -> int:
-        return len(self.apart["path"])
 
 
 @dataclass(frozen=True, eq=False)
@@ -58,164 +39,157 @@ class Noise:
     rivals: "tuple[tuple[float, Noise], ...]" = ()
 
 
-def stations(rotation: Array, origin_base: Array) -> Stations:
-    """Return at most MOST_STATIONS stations of m poses in the order recorded: rotation (m, 3, 3), origin_base (m, 3)."""
-    turn = np.arccos(np.clip((np.einsum("nij,nij->n", rotation[1:], rotation[:-1]) - 1.0) / 2.0, -1.0, 1.0))
-    step = np.linalg.norm(np.diff(origin_base, axis=0), axis=1) + LEVER_MM * turn
-    path = np.concatenate([[0.0], np.cumsum(step)])
-    # Between passes the robot travels farther than from pose to pose, and perhaps another way.
-    run = (
-        np.concatenate([[0], np.cumsum(step > JUMP * np.median(step[step > 1e-6]))])
-        if (step > 1e-6).any()
-        else 0 * path
-    )
-    # One station never holds poses of two passes: their errors are not one.
-    start = np.unique(run, return_index=True)[1]
-    within = path - path[start][run]
-    width, station = 0.5, _stations(run, within, 0.5)
-    while station.max() >= max(MOST_STATIONS, len(start)):
-        width *= 1.3
-        station = _stations(run, within, width)
-    first = np.unique(station, return_index=True)[1]
-    # The pose in the middle of each station stands for it.
-    middle = first + (np.bincount(station) - 1) // 2
-    r, p, s = rotation[middle], origin_base[middle], path[middle]
-    cosine = (np.einsum("aij,bij->ab", r, r) - 1.0) / 2.0
-    turned = np.arccos(np.clip(cosine, -1.0, 1.0))
-    np.fill_diagonal(turned, 0.0)
-    air = np.hypot(np.linalg.norm(p[:, None] - p[None], axis=2), LEVER_MM * turned)
-    way = np.abs(s[:, None] - s[None])
-    same = run[middle][:, None] == run[middle][None]
-    return Stations(station, {"path": way, "passes": np.where(same, way, FAR_MM), "space": air})
+# Of n readings: pose (n,), derivatives by the pose's error (n, 3), by the unknown beside the residual (n, p + 1).
+Rows = tuple[NDArray[np.integer], Array, Array]
 
 
-def _stations(run: NDArray[np.int64], within_mm: Array, width_mm: float) -> NDArray[np.int64]:
-    """Return the station of each pose (m,): a run, and a stretch of it."""
-    stretch = np.floor(within_mm / width_mm).astype(np.int64)
-    return np.asarray(np.unique(run * (stretch.max() + 1) + stretch, return_inverse=True)[1].ravel())
+@dataclass(frozen=True, eq=False)
+class Correlation:
+    """How the robot's errors at s stations go together: exp(-distance / length_mm), distance by `metric`.
 
+    inverse: of the correlation, (s, s); or of one along the way, which is Markov's, its diagonal and the one beside it,
+    (2, s), the last of the second nothing.
+    """
 
-# Of n readings: station (n,), derivatives by the pose's error (n, 3), by the unknown beside the residual (n, p + 1).
-Rows = tuple[NDArray[np.int64], Array, Array]
-# Metric, length (mm), inverse of the correlation between stations (s, s), log determinant of the correlation.
-Correlation = tuple[str, float, Array, float]
+    metric: str
+    length_mm: float
+    inverse: Array
+    log_det: float
+
+    @property
+    def along(self) -> bool:
+        """Only neighbours are coupled."""
+        return self.metric != "space"
 
 
 class Sums:
-    """Readings of several kinds summed per station, for any noise."""
+    """Readings of several kinds summed per station, for any noise. rows: with the pose of each reading (n,)."""
 
-    def __init__(self, rows: dict[str, Rows], count: int) -> None:
-        self.count = count
-        self.n = {kind: len(at) for kind, (at, _, _) in rows.items()}
+    def __init__(self, rows: dict[str, Rows], at: Stations) -> None:
+        self.count, self.at = len(at), at
+        rows = {kind: (at.of_pose[pose], z, j) for kind, (pose, z, j) in rows.items()}
+        count = self.count
+        self.n = {kind: len(station) for kind, (station, _, _) in rows.items()}
         self.zz, self.zj, self.jj = {}, {}, {}
-        for kind, (at, z, j) in rows.items():
-            self.zz[kind] = _by_station(at, z, z, count)
-            self.zj[kind] = _by_station(at, z, j, count).reshape(3 * count, -1)
+        for kind, (station, z, j) in rows.items():
+            self.zz[kind] = _by_station(station, z, z, count)
+            self.zj[kind] = _by_station(station, z, j, count).reshape(3 * count, -1)
             self.jj[kind] = j.T @ j
 
-    def solve(self, sigma: dict[str, float], pose_mm: float, inverse: Array) -> tuple[Array, Array, float]:
+    def solve(self, sigma: dict[str, float], pose_mm: float, correlation: Correlation) -> tuple[Array, Array, float]:
         """Return the normal matrix, the stations' errors and a log determinant.
 
         normal (p + 1, p + 1): of unknown and residual. errors (3 s, p + 1): of the stations, per unit of each column. The
-        log determinant is that of the readings' covariance but for the correlation's. inverse (s, s): of the correlation.
+        log determinant is that of the readings' covariance but for the correlation's.
         """
         count = self.count
-        precision = np.zeros((count, 3, count, 3))
-        axis, at = np.arange(3), np.arange(count)
-        precision[:, axis, :, axis] = inverse / pose_mm**2
-        precision[at, :, at, :] += sum(self.zz[k] / sigma[k] ** 2 for k in self.zz)
-        shared = sum(self.zj[k] / sigma[k] ** 2 for k in self.zj)
-        factor = cholesky(precision.reshape(3 * count, 3 * count), lower=True, check_finite=False)
-        half = solve_triangular(factor, shared, lower=True, check_finite=False)
-        normal = sum(self.jj[k] / sigma[k] ** 2 for k in self.jj) - half.T @ half
-        log_det = 2.0 * float(np.log(np.diag(factor)).sum()) + 6.0 * count * np.log(pose_mm)
+        own = np.sum([self.zz[k] / sigma[k] ** 2 for k in self.zz], axis=0)
+        shared = np.sum([self.zj[k] / sigma[k] ** 2 for k in self.zj], axis=0)
+        inverse = correlation.inverse / pose_mm**2
+        if correlation.along:
+            band = np.zeros((4, count, 3))
+            band[0] = inverse[0][:, None] + np.einsum("sii->si", own)
+            band[1, :, :2] = np.stack([own[:, 1, 0], own[:, 2, 1]], axis=1)
+            band[2, :, 0] = own[:, 2, 0]
+            band[3] = inverse[1][:, None]
+            lower = cholesky_banded(band.reshape(4, 3 * count), lower=True, check_finite=False)
+            errors, roots = cho_solve_banded((lower, True), shared, check_finite=False), lower[0]
+        else:
+            precision = np.zeros((count, 3, count, 3))
+            axis, at = np.arange(3), np.arange(count)
+            precision[:, axis, :, axis] = inverse
+            precision[at, :, at, :] += own
+            factor = cholesky(precision.reshape(3 * count, 3 * count), lower=True, check_finite=False)
+            half = solve_triangular(factor, shared, lower=True, check_finite=False)
+            errors = solve_triangular(factor, half, lower=True, trans="T", check_finite=False)
+            roots = np.diag(factor)
+        normal = sum(self.jj[k] / sigma[k] ** 2 for k in self.jj) - shared.T @ errors
+        log_det = 2.0 * float(np.log(roots).sum()) + 6.0 * count * np.log(pose_mm)
         log_det += 2.0 * sum(n * np.log(sigma[k]) for k, n in self.n.items())
-        errors = solve_triangular(factor, half, lower=True, trans="T", check_finite=False)
-        return np.asarray(normal), np.asarray(errors), log_det
+        return np.asarray(0.5 * (normal + normal.T)), np.asarray(errors), log_det
 
 
-def fit_noise(sums: Sums, prior: Array, at: Stations, start: Noise, anew: bool = True) -> Noise:
+def fit_noise(few: Sums, many: Sums, prior: Array, start: Noise, anew: bool = True) -> Noise:
     """Return the noise that makes the residuals most likely.
 
     Restricted likelihood: Patterson, Thompson, Biometrika 58, 1971, doi:10.1093/biomet/58.3.545.
-    prior (p + 1, p + 1): information on the unknown (and its residual) beside the readings.
-    anew: choose metric and length too, not only how large the noise is.
+    few, many: the readings summed over few stations, on which all correlations are compared, and over many, on which those
+    along the way are then followed closely. prior (p + 1, p + 1): information on the unknown (and its residual) beside the
+    readings. anew: choose metric and length too, not only how large the noise is.
     """
-    kinds = list(sums.n)
+    kinds = list(few.n)
     values = np.log([*(_sigma(start, kind) for kind in kinds), start.pose_mm])
     low, high = np.log([*(FLOOR[kind] for kind in kinds), FLOOR["pose"]]), np.full(len(values), np.log(CEILING))
 
-    def cost(v: Array, correlation: Correlation) -> float:
+    def cost(v: Array, correlation: Correlation, sums: Sums) -> float:
         sigma = dict(zip(kinds, np.exp(v[:-1]), strict=True))
-        normal, _, own = sums.solve(sigma, float(np.exp(v[-1])), correlation[2])
+        normal, _, own = sums.solve(sigma, float(np.exp(v[-1])), correlation)
         full = normal + prior
         try:
             factor = cholesky(full[:-1, :-1], lower=True, check_finite=False)
         except np.linalg.LinAlgError:
             return IMPOSSIBLE  # so little noise that differences of large sums are all rounding
         part = solve_triangular(factor, full[:-1, -1], lower=True, check_finite=False)
-        return float(own + 3.0 * correlation[3] + 2.0 * np.log(np.diag(factor)).sum() + full[-1, -1] - part @ part)
+        log_det = own + 3.0 * correlation.log_det + 2.0 * np.log(np.diag(factor)).sum()
+        return float(log_det + full[-1, -1] - part @ part)
 
-    def settle(v: Array, correlation: Correlation) -> Array:
+    def settle(v: Array, metric: str, length_mm: float) -> Array:
+        sums = few if metric == "space" else many
+        given = (correlation(sums.at, metric, length_mm), sums)
         bounds = list(zip(low, high, strict=True))
         options = {"maxiter": 30, "ftol": 1e-8}
-        found = minimize(cost, np.clip(v, low, high), (correlation,), method="L-BFGS-B", bounds=bounds, options=options)
+        found = minimize(cost, np.clip(v, low, high), given, method="L-BFGS-B", bounds=bounds, options=options)
         return np.asarray(found.x)
 
-    correlation = _correlation_of(at, start.metric, start.length_mm)
-    values = settle(values, correlation)
+    values = settle(values, start.metric, start.length_mm)
     if not anew:
-        return _noise(kinds, values, correlation, at, start)
+        return _noise(kinds, values, start.metric, start.length_mm, few.at, start)
     tried = []
-    for correlation in _correlations(at):
+    for metric, length_mm in product(few.at.apart, LENGTHS_MM):
         # What the robot adds goes with how it is correlated; the rest hardly does, until the last round.
+        k = correlation(few.at, metric, length_mm)
         found = minimize_scalar(
-            lambda p, c=correlation: cost(np.r_[values[:-1], p], c),
-            bounds=(low[-1], high[-1]),
-            method="bounded",
+            lambda p, k=k: cost(np.r_[values[:-1], p], k, few), bounds=(low[-1], high[-1]), method="bounded",
             options=COARSE,
-        )
-        tried.append((float(found.fun), float(found.x), correlation))
-    best, pose, correlation = min(tried, key=lambda t: t[0])
-    values = settle(np.r_[values[:-1], pose], correlation)
-    found = _noise(kinds, values, correlation, at, start)
+        )  # fmt: skip
+        tried.append((float(found.fun), float(found.x), metric, length_mm))
+    best, pose, metric, length_mm = min(tried, key=lambda t: t[0])
+    values = settle(np.r_[values[:-1], pose], metric, length_mm)
+    found = _noise(kinds, values, metric, length_mm, few.at, start)
     others = [
-        (float(np.exp((best - c) / 2.0)), _noise(kinds, np.r_[values[:-1], p], k, at, start)) for c, p, k in tried
+        (float(np.exp((best - c) / 2.0)), _noise(kinds, np.r_[values[:-1], p], m, ell, few.at, start))
+        for c, p, m, ell in tried
     ]
     return replace(found, rivals=tuple((w, n) for w, n in others if w > UNLIKELY))
 
 
-def _noise(kinds: list[str], values: Array, correlation: Correlation, at: Stations, start: Noise) -> Noise:
+def _noise(kinds: list[str], values: Array, metric: str, length_mm: float, at: Stations, start: Noise) -> Noise:
     by = dict(zip((*kinds, "pose"), np.exp(values), strict=True))
-    metric, length = correlation[:2]
-    independent = len(at) ** 2 / float((np.exp(-at.apart[metric] / length) ** 2).sum())
+    independent = len(at) ** 2 / float((np.exp(-at.apart[metric] / length_mm) ** 2).sum())
     level = float(by.get("level", start.level_db))
-    return Noise(float(by["distance"]), level, float(by["pose"]), length, metric, independent)
+    return Noise(float(by["distance"]), level, float(by["pose"]), length_mm, metric, independent)
 
 
-def correlation_inverse(at: Stations, noise: Noise) -> Array:
-    """Return the inverse correlation (s, s) of the robot's errors between stations."""
-    return np.asarray(np.linalg.inv(_correlation(at.apart[noise.metric], noise.length_mm)))
-
-
-def _correlation(apart: Array, length_mm: float) -> Array:
-    return np.exp(-apart / length_mm) + 1e-9 * np.eye(len(apart))
-
-
-def _correlations(at: Stations) -> Iterator[Correlation]:
-    return (_correlation_of(at, metric, length) for metric in at.apart for length in LENGTHS_MM)
-
-
-def _correlation_of(at: Stations, metric: str, length_mm: float) -> Correlation:
-    k = _correlation(at.apart[metric], length_mm)
-    return metric, length_mm, np.asarray(np.linalg.inv(k)), float(np.linalg.slogdet(k)[1])
+def correlation(at: Stations, metric: str, length_mm: float) -> Correlation:
+    """Return the correlation of the robot's errors between stations, inverted."""
+    if metric == "space":
+        k = np.exp(-at.apart[metric] / length_mm) + 1e-9 * np.eye(len(at))
+        return Correlation(metric, length_mm, np.asarray(np.linalg.inv(k)), float(np.linalg.slogdet(k)[1]))
+    rho = np.exp(-at.next_mm[metric] / length_mm)
+    new = -np.expm1(-2.0 * at.next_mm[metric] / length_mm)
+    inverse = np.zeros((2, len(at)))
+    inverse[0] = 1.0
+    inverse[0, :-1] += rho**2 / new
+    inverse[0, 1:] += 1.0 / new - 1.0
+    inverse[1, :-1] = -rho / new
+    return Correlation(metric, length_mm, inverse, float(np.log(new).sum()))
 
 
 def _sigma(noise: Noise, kind: str) -> float:
     return noise.distance_mm if kind == "distance" else noise.level_db
 
 
-def _by_station(at: NDArray[np.int64], left: Array, right: Array, count: int) -> Array:
+def _by_station(at: NDArray[np.integer], left: Array, right: Array, count: int) -> Array:
     """Return sums over each station's readings of left (n, 3) times right (n, q), (s, 3, q)."""
     products = (left[:, :, None] * right[:, None, :]).reshape(len(left), -1)
     order = np.argsort(at, kind="stable")

@@ -7,11 +7,12 @@ from numpy.typing import NDArray
 from scipy.linalg import cho_factor, cho_solve
 
 from alignment.calibrate.passes import pass_starts
-from alignment.calibrate.pose_noise import Noise, Rows, Stations, Sums, correlation_inverse, fit_noise, stations
+from alignment.calibrate.pose_noise import Noise, Rows, Sums, correlation, fit_noise
 from alignment.calibrate.result import Calibration, Estimate, factor_95
 from alignment.calibrate.sphere_model import CENTRE, LEVEL, LOSS, RADIUS, SLOPE, TCP, UNKNOWNS, Seen, SphereViews, see
 from alignment.calibrate.sphere_search import on_sphere
 from alignment.calibrate.sphere_views import MIN_READINGS, first_look, sphere_views
+from alignment.calibrate.stations import stations
 from alignment.calibrate.tcp_result import PRIOR, split_held, tcp_estimates, tcp_patch
 from alignment.scan import Scan
 from planner.errors import fail
@@ -109,8 +110,8 @@ class _Fit:
         if known:
             self.believed[RADIUS] = self.radius_mm
         self.levels = np.isfinite(views.level_db)
-        self.at: Stations = stations(views.rotation, views.origin_base)
-        self.noise = Noise(0.02, 0.3, 0.03, 10.0, "path", float(len(self.at)))
+        self.few, self.many = stations(views.rotation, views.origin_base)
+        self.noise = Noise(0.02, 0.3, 0.03, 10.0, "path", float(len(self.few)))
         self.use = self._first_use()
 
     def _first_use(self) -> dict[str, NDArray[np.bool_]]:
@@ -152,9 +153,9 @@ class _Fit:
             prior[-1, -1] = offset @ (information * offset)
             rows = self._rows(seen, basis)
             used = {k: (s[u], z[u], j[u]) for k, (s, z, j) in rows.items() if (u := self.use[k]).any()}
-            sums = Sums(used, len(self.at))
+            sums = Sums(used, self.few), Sums(used, self.many)
             if round_ in rounds:
-                self.noise = fit_noise(sums, prior, self.at, self.noise, anew=round_ == rounds[-1])
+                self.noise = fit_noise(*sums, prior, self.noise, anew=round_ == rounds[-1])
             step, covariance, errors = self._step(sums, prior, self.noise)
             if round_ == ROUNDS - 1:
                 covariance = self._mixed(sums, prior, step)
@@ -162,14 +163,19 @@ class _Fit:
             self._choose(seen, rows, step, errors)
         return np.asarray(basis @ covariance @ basis.T)
 
-    def _step(self, sums: Sums, prior: Array, noise: Noise) -> tuple[Array, Array, Array]:
-        """Return the step (p,), its covariance (p, p) and the stations' errors per column (3 s, p + 1)."""
+    def _step(self, sums: tuple[Sums, Sums], prior: Array, noise: Noise) -> tuple[Array, Array, Array]:
+        """Return the step (p,), its covariance (p, p) and the poses' errors per column (m, 3, p + 1).
+
+        sums: over few stations, and over many.
+        """
         sigma = {"distance": noise.distance_mm, "level": noise.level_db}
-        normal, errors, _ = sums.solve(sigma, noise.pose_mm, correlation_inverse(self.at, noise))
+        of = sums[0] if noise.metric == "space" else sums[1]
+        normal, errors, _ = of.solve(sigma, noise.pose_mm, correlation(of.at, noise.metric, noise.length_mm))
         factor = cho_factor((normal + prior)[:-1, :-1])
+        errors = errors.reshape(of.count, 3, -1)[of.at.of_pose]
         return cho_solve(factor, (normal + prior)[:-1, -1]), cho_solve(factor, np.eye(len(normal) - 1)), errors
 
-    def _mixed(self, sums: Sums, prior: Array, step: Array) -> Array:
+    def _mixed(self, sums: tuple[Sums, Sums], prior: Array, step: Array) -> Array:
         """Return the covariance (p, p) about a step, over what the noise may be: how it is correlated is a guess, too."""
         total, weights = np.zeros((len(step), len(step))), 0.0
         for weight, noise in self.noise.rivals:
@@ -179,20 +185,19 @@ class _Fit:
         return total / weights
 
     def _rows(self, seen: Seen, basis: Array) -> dict[str, Rows]:
-        """By kind: station, derivatives by the pose's error, derivatives by the unknown beside the residual."""
-        station = self.at.of_pose[self.views.pose]
+        """By kind: pose, derivatives by the pose's error, derivatives by the unknown beside the residual."""
         kinds = {
             "distance": (seen.d_distance, self.views.distance_mm - seen.distance_mm),
             "level": (seen.d_level, np.nan_to_num(self.views.level_db) - seen.level_db),
         }
-        return {k: (station, -d[:, CENTRE], np.column_stack([d @ basis, off])) for k, (d, off) in kinds.items()}
+        return {k: (self.views.pose, -d[:, CENTRE], np.column_stack([d @ basis, off])) for k, (d, off) in kinds.items()}
 
     def _choose(self, seen: Seen, rows: dict[str, Rows], step: Array, errors: Array) -> None:
         """Leave out what neither the sphere nor its pose's error explains."""
-        of_station = (errors[:, -1] - errors[:, :-1] @ step).reshape(-1, 3)
+        of_pose = errors[..., -1] - errors[..., :-1] @ step
         limit = {"distance": DISTANCE_DB, "level": LEVEL_DB}
         sigma = {"distance": self.noise.distance_mm, "level": self.noise.level_db}
-        for kind, (station, z, j) in rows.items():
-            left = j[:, -1] - j[:, :-1] @ step - np.einsum("ni,ni->n", z, of_station[station])
+        for kind, (pose, z, j) in rows.items():
+            left = j[:, -1] - j[:, :-1] @ step - np.einsum("ni,ni->n", z, of_pose[pose])
             self.use[kind] = (np.abs(left) < OUTLIER_SIGMAS * sigma[kind]) & (seen.loss_db < limit[kind])
         self.use["level"] = self.use["level"] & self.levels & self.use["distance"]

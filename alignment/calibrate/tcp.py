@@ -1,11 +1,13 @@
 """TCP offset and tilt from a fixed plane seen from several poses."""
 
 import numpy as np
+from numpy.typing import NDArray
 from scipy.optimize import least_squares
 from scipy.spatial.transform import Rotation
 
 from alignment.calibrate.passes import pass_starts
 from alignment.calibrate.result import Calibration
+from alignment.calibrate.stations import stretches
 from alignment.calibrate.tcp_poses import PlaneViews, plane_views
 from alignment.calibrate.tcp_result import PRIOR, split_held, tcp_estimates, tcp_patch
 from alignment.scan import Scan
@@ -68,6 +70,7 @@ class _Problem:
         self.views, self.loss = views, setup.probe.tilt_loss_db_per_deg2
         self.offset = setup.probe.face_offset_mm
         self.rotation, self.origin = views.Ts_base_tcp.rotation_matrix, views.Ts_base_tcp.xyz_mm
+        self.shared = stretches(self.rotation, self.origin)
         self.centre = self.origin.mean(axis=0)
         beam = self.rotation[:, :, 2].mean(axis=0)
         self.normal = -beam / np.linalg.norm(beam)
@@ -137,27 +140,28 @@ class _Problem:
                 sigma[g] = max(float(np.sqrt((part[kinds[g]] ** 2).sum() / free[-1])), 1e-9)
                 # From the kinds as recorded, so that a view is not lost for good to a bad first round.
                 kinds[g] = self.kinds[g] & (np.abs(np.nan_to_num(part, nan=np.inf)) < OUTLIER_SIGMAS * sigma[g])
-        pose = np.concatenate([np.flatnonzero(k) for k in used_kinds])
-        covariance = _by_pose(found.jac, found.fun, pose, covariance)
+        shared = np.concatenate([self.shared[k] for k in used_kinds])
+        covariance = _by_stretch(found.jac, found.fun, shared, covariance)
         block = basis @ covariance[4:, 4:] @ basis.T
         rms = float(np.sqrt(np.mean(parts[0][kinds[0]] ** 2)))
         self.parts, self.used = parts, kinds
-        return basis @ unknown[4:], block, min(free), rms
+        return basis @ unknown[4:], block, min(*free, max(len(np.unique(shared)) - len(unknown), 2)), rms
 
 
-def _by_pose(jacobian: Array, residual: Array, pose: Array, covariance: Array) -> Array:
-    """Return the covariance that holds when what one pose says is correlated: the robot's error enters all of it.
+def _by_stretch(jacobian: Array, residual: Array, shared: NDArray[np.int64], covariance: Array) -> Array:
+    """Return the covariance that holds when what one stretch of the way says is correlated: the robot's error enters all of it.
 
-    Sandwich over poses with each residual freed of its own leverage (jackknife form, MacKinnon and White, J. Econometrics
-    29, 1985, doi:10.1016/0304-4076(85)90158-7); the rows below the data are the prior, which counts as it is.
+    shared (n,): the stretch of each of the first n rows; the rows below the data are the prior, which counts as it is.
+    Sandwich over stretches with each residual freed of its own leverage (jackknife form, MacKinnon and White, J.
+    Econometrics 29, 1985, doi:10.1016/0304-4076(85)90158-7).
     """
-    n = len(pose)
+    n = len(shared)
     prior = jacobian[n:]
     middle = prior.T @ prior
-    for i in np.unique(pose):
-        rows = np.flatnonzero(pose == i)
+    for i in np.unique(shared):
+        rows = np.flatnonzero(shared == i)
         j = jacobian[rows]
-        own = np.eye(len(rows)) - j @ covariance @ j.T
-        score = j.T @ np.linalg.solve(own, residual[rows])
+        # (I - J C J')^-1 r by Woodbury, small however many rows: J' of it is (I - J'J C)^-1 J' r.
+        score = np.linalg.solve(np.eye(len(covariance)) - j.T @ j @ covariance, j.T @ residual[rows])
         middle = middle + np.outer(score, score)
     return np.asarray(covariance @ middle @ covariance)
