@@ -89,7 +89,7 @@ def diagnose_fit(cloud: PointCloud, problem: Problem, found: MapFit) -> list[Iss
                 "scan",
             )
         )
-    return issues + edge_issues(found) + speed_issues(found, problem)
+    return issues + edge_issues(found, problem.setup) + speed_issues(found, problem)
 
 
 def _beyond_limits(found: MapFit, problem: Problem) -> bool:

@@ -4,6 +4,8 @@ On a flat part the order of the laws hardly shows in the distances. At the edges
 array says, and in the wrong order crossings at the ends of the array contradict those of the other passes.
 """
 
+from typing import Any
+
 import numpy as np
 
 from alignment.cloud import PointCloud
@@ -11,6 +13,7 @@ from alignment.estimate.hypotheses import Hypothesis
 from alignment.estimate.map import MapFit, align_map
 from alignment.estimate.problem import Problem
 from planner.issues import Issue
+from planner.setup import Setup
 
 # No robot and no beam leaves crossings this far (rms, mm) off the edges of a part that is as its CAD.
 OFF_EDGES_MM = 0.5
@@ -23,9 +26,34 @@ BETTER = 0.5
 LEAST_CROSSINGS = 20
 
 
-def edge_issues(found: MapFit) -> list[Issue]:
-    """Return a warning where the placement that fits the surface best does not fit the edges that were crossed."""
-    off_mm = 0.0 if found.edges is None else found.edges["rms_mm"]
+# Edges seen this much late or early (mm), and by so many standard deviations, are worth a word.
+LATE_MM, LATE_SIGMAS = 0.15, 4.0
+
+
+def edge_issues(found: MapFit, setup: Setup) -> list[Issue]:
+    """Return warnings where the placement does not fit the edges that were crossed, and where they are seen late."""
+    if found.edges is None:
+        return []
+    return _off(found.edges["rms_mm"]) + _late(found.edges, setup)
+
+
+def _late(edges: dict[str, Any], setup: Setup) -> list[Issue]:
+    late_mm = edges["late_mm"]
+    if abs(late_mm) < max(LATE_MM, LATE_SIGMAS * edges["late_sigma_mm"]):
+        return []
+    word, speed = "late" if late_mm > 0 else "early", setup.alignment.scan_speed_mm_s
+    text = (
+        f"edges are seen {abs(late_mm):.2f} mm {word} along the travel: echoes are recorded {word} against the poses (by "
+        f"{1e3 * abs(late_mm) / speed:.1f} ms at {speed:g} mm/s), or the beam is cut off otherwise than at half. It was "
+        "estimated along; without passes in opposite directions the part would seem to have moved."
+    )
+    remedy = (
+        "Correct the delay between ultrasound and robot: the inspection's forward and backward passes shift by it, too."
+    )
+    return [Issue("warning", "edges-late", text, remedy, "scan")]
+
+
+def _off(off_mm: float) -> list[Issue]:
     if off_mm <= OFF_EDGES_MM:
         return []
     text = (

@@ -22,7 +22,7 @@ from alignment.estimate.pose_line import PoseLine, pose_line
 from alignment.estimate.problem import Problem
 from alignment.estimate.robust_fit import robust_fit
 from alignment.estimate.surface_rows import Rows, same_afresh
-from alignment.estimate.system import BIAS_SHARE, LAG_SIGMA_MM, EdgeData, System
+from alignment.estimate.system import BIAS_SHARE, LAG_SIGMA_MM, EdgeData, System, nuisance_columns
 from planner.frames import Array, Transform
 from planner.setup import Setup
 from planner.surface.boundary import boundary
@@ -217,7 +217,8 @@ def _plain_if_sprung(state: State, system: System, T_plain: Transform, held: Arr
     if left <= MUCH_WORSE * SHAPE_MM and not stay_on_edges:
         return state
     least = _rms_mm(system, plain)
-    slid = stay_on_edges and _edge_rms_mm(system, state.T_base_part) > MUCH_WORSE * _edge_rms_mm(system, plain)
+    of_edges = [_edge_rms_mm(system, T, state.nuisance) for T in (state.T_base_part, plain)]
+    slid = stay_on_edges and of_edges[0] > MUCH_WORSE * of_edges[1]
     if least > SHAPE_MM and (left > MUCH_WORSE * least or slid):
         return replace(state, T_base_part=plain)
     return state
@@ -229,25 +230,31 @@ def _rms_mm(system: System, T_base_part: Transform) -> float:
     return float(np.sqrt(np.average(rows.r[used] ** 2, weights=system.patches.count[used]))) if used.any() else np.inf
 
 
-def _edge_rms_mm(system: System, T_base_part: Transform) -> float:
-    """Return how far the crossings lie off their edges (rms, mm), 0 without any."""
+def _edge_rms_mm(system: System, T_base_part: Transform, nuisance: Array) -> float:
+    """Return how far the crossings lie off their edges, bias, lag and tilt taken off (rms, mm); 0 without any."""
     if system.edges is None or not system.edges.used.any():
         return 0.0
     found = system.edges.rows(system.problem, T_base_part)
-    return float(np.sqrt(np.mean(found.r[system.edges.used] ** 2)))
+    left = found.r + nuisance_columns(system.edges, found) @ nuisance
+    return float(np.sqrt(np.mean(left[system.edges.used] ** 2)))
 
 
 def _edge_report(state: State, system: System, post: Posterior) -> dict[str, Any] | None:
     if system.edges is None:
         return None
     used = system.edges.used
-    sigma = np.sqrt(np.diag(post.covariance)[6:])
+    to_mm = np.array([system.edges.bias_sigma_mm, LAG_SIGMA_MM])
+    # What bias and lag come to together is known even where every edge was crossed outwards and they cannot be told apart.
+    both = post.covariance[6:8, 6:8] * np.outer(to_mm, to_mm)
+    bias, lag = state.nuisance[:2] * to_mm
     return {
         "crossings": len(used),
         "used": int(used.sum()),
-        "rms_mm": _edge_rms_mm(system, state.T_base_part),
-        "bias_mm": float(state.nuisance[0] * system.edges.bias_sigma_mm),
-        "bias_sigma_mm": float(sigma[0] * system.edges.bias_sigma_mm),
-        "lag_mm": float(state.nuisance[1] * LAG_SIGMA_MM),
-        "lag_sigma_mm": float(sigma[1] * LAG_SIGMA_MM),
+        "rms_mm": _edge_rms_mm(system, state.T_base_part, state.nuisance),
+        "bias_mm": float(bias),
+        "bias_sigma_mm": float(np.sqrt(both[0, 0])),
+        "lag_mm": float(lag),
+        "lag_sigma_mm": float(np.sqrt(both[1, 1])),
+        "late_mm": float(bias + lag),
+        "late_sigma_mm": float(np.sqrt(both.sum())),
     }

@@ -19,10 +19,10 @@ MOST_EDGE_ROWS = 90
 LAWS_PER_ROW = 12.0
 COARSENINGS = 20
 # What the beam's asymmetry and the detection may shift every crossing by, as a share of the beam width, and what a late
-# clock may shift it by along the travel (mm); and tilt takes more or less of the echo at a curved rim than the set-up says. All
-# are estimated along; opposite edges, opposite passes and rims of different slope tell them apart.
+# clock may shift it by along the travel (mm: 3 to 6 ms at 50 to 100 mm/s); and tilt takes more or less of the echo at a curved
+# rim than the set-up says. All are estimated along: opposite edges, opposite passes, rims of different slope tell them apart.
 BIAS_SHARE = 0.04
-LAG_SIGMA_MM = 0.1
+LAG_SIGMA_MM = 0.3
 NUISANCES = 3
 # How far off what the set-up says of tilt at the rim may be, in differences between its two extremes.
 TILT_DOUBT = 2.0
