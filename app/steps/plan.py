@@ -13,6 +13,7 @@ from app.steps.creases import crease_issues
 from app.steps.programs import export_path, program_name
 from planner.cad import read_part
 from planner.checks import check
+from planner.checks.left import left_issues
 from planner.checks.orientation import orientation_issues
 from planner.checks.regions import region_issues
 from planner.checks.tessellation import tessellation_issues
@@ -80,6 +81,7 @@ def run_plan(request: PlanRequest, progress: Progress) -> tuple[Plan, Artifacts]
     inspection = raster(curved, setup)
     progress(0.7, "measuring coverage")
     covered = {p.kind: coverage(curved, p, setup) for p in (alignment, inspection)}
+    issues += left_issues(curved, covered["inspection"], setup)
     if not request.keypoints:
         issues += _coverage_issues(covered["alignment"].swept_share, surface.area_mm2, setup)
     progress(0.75, "predicting the accuracy")

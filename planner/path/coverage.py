@@ -21,6 +21,8 @@ from planner.toolpath import ToolPath
 
 _SAMPLES = 120_000
 _CANDIDATES = 12
+# Samples beside edges need stand for no less than this.
+_FINE_MM2 = 2.0
 _EPS_MM = 1e-6
 
 
@@ -139,6 +141,29 @@ def swept_share(curved: CurvedSurface, path: ToolPath, setup: Setup, samples: in
         _sweep(points, normals, poses, setup, swept, np.zeros_like(swept))
     free = ~keep_outs_of(curved.surface, setup).inside(points)
     return float((swept & free).sum() / max(int(free.sum()), 1))
+
+
+def missed_near_edges(curved: CurvedSurface, path: ToolPath, setup: Setup) -> tuple[Samples, Array, Array]:
+    """Return samples, their points and normals (n, 3), that no DATA motion sweeps, near edges.
+
+    Within two swaths of the boundary, outside of the edge margin and of the room that passes keep from keep-outs.
+    """
+    margin, swath = setup.inspection.edge_margin_mm, setup.probe.swath_mm
+    count = int(np.clip(curved.surface.area_mm2 / _FINE_MM2, _SAMPLES // 10, _SAMPLES))
+    s = sample_equal_area(curved.surface.face_areas_mm2, count)
+    points, normals = curved.evaluate(s.face, s.bary)
+    edge = PathMesh.of(curved.surface).boundary_distance(points, margin + 2.0 * swath)
+    row = np.flatnonzero(np.isfinite(edge) & (edge > margin))
+    keep = keep_outs_of(curved.surface, setup)
+    if len(keep):
+        row = row[keep.room_mm(points[row], LEAD_MM) >= 0.0]
+    points, normals = points[row], normals[row]
+    swept = np.zeros(len(row), dtype=bool)
+    poses = _poses(path)
+    if poses is not None and len(row):
+        _sweep(points, normals, poses, setup, swept, np.zeros_like(swept))
+    row, points, normals = row[~swept], points[~swept], normals[~swept]
+    return Samples(s.face[row], s.bary[row], s.area_mm2[row]), points, normals
 
 
 def _poses(path: ToolPath) -> _Poses | None:

@@ -60,3 +60,13 @@ def tangent(direction: Array, normals: Array) -> Array:
     t = d - np.einsum("ij,ij->i", d, normals)[:, None] * normals
     length = lengths(t)[:, None]
     return np.divide(t, length, out=np.zeros_like(t), where=length > 1e-9)
+
+
+def towards_higher(fine: Subdivision, d: Array) -> Array:
+    """Return the direction (f, 3) in which a distance d (v,) grows in each triangle; zero where it is flat."""
+    a, b, c = (fine.vertices[fine.faces[:, k]] for k in range(3))
+    da, db, dc = (d[fine.faces[:, k]] for k in range(3))
+    n = np.cross(b - a, c - a)
+    g = (db - da)[:, None] * np.cross(n, a - c) + (dc - da)[:, None] * np.cross(n, b - a)
+    length = np.linalg.norm(g, axis=1, keepdims=True)
+    return np.divide(g, length, out=np.zeros_like(g), where=length > 0)

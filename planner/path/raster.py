@@ -7,7 +7,8 @@ from scipy.ndimage import maximum_filter1d
 from planner.errors import fail
 from planner.frames import Array
 from planner.path.axes import ScanAxes, raster_axes
-from planner.path.cut import tangent
+from planner.path.cut import Cut, tangent
+from planner.path.edge_passes import Left, edge_cut, joined, left_by, useful
 from planner.path.fence import raster_fence
 from planner.path.links import with_links
 from planner.path.mesh import PathMesh
@@ -32,7 +33,8 @@ def raster(curved: CurvedSurface, setup: Setup) -> ToolPath:
 
     `plane`: sections by parallel planes along `inspection.direction`; `geodesic`: lines of equal distance, measured on the
     surface, from the longest central section along it, or from the line drawn. Both keep the step on the surface, go forth and
-    back, hold the array's heading in space, and split at holes and sharp turns.
+    back, hold the array's heading in space, and split at holes and sharp turns. Passes along edges follow, over what all
+    these leave beside holes and slanted edges, where that is worth a pass (`edge_passes`).
 
     The track of the TCP keeps `edge_margin_mm` from the edge at the ends of each pass; across, the swath of the
     outermost pass reaches the margin line. Poses are spaced equally, at `point_spacing_mm` or an integer part of it;
@@ -65,6 +67,27 @@ def raster(curved: CurvedSurface, setup: Setup) -> ToolPath:
     if not cut.exact:
         track = split_at_turns(track, _sharp(track, cut.mesh.face_normals, spacing))
     track = _in_order(track, axes)
+    data = _data(curved, cut, track, spacing)
+    path = assemble(data, "inspection", setup.standoff_mm, spacing)
+    left = left_by(path, curved, setup)
+    if left is not None:
+        more = _along_edges(curved, left, path, setup, spacing)
+        if more is not None:
+            path = assemble(joined(data, more), "inspection", setup.standoff_mm, spacing)
+    return with_links(path, curved, setup)
+
+
+def _along_edges(curved: CurvedSurface, left: Left, path: ToolPath, setup: Setup, spacing: float) -> DataRuns | None:
+    """Return passes along edges that see what the raster left there; None if there are none worth it."""
+    cut, track = edge_cut(curved, left, setup, spacing)
+    if not len(track.level):
+        return None
+    track = split_at_turns(track, _sharp(track, cut.mesh.face_normals, spacing))
+    return useful(_data(curved, cut, track, spacing), left, path, spacing)
+
+
+def _data(curved: CurvedSurface, cut: Cut, track: Tracks, spacing: float) -> DataRuns:
+    """Return the DATA poses of tracks: on the smooth surface, travel and heading of each pass."""
     face, bary = cut.on_surface(track.face, track.bary)
     points, normals = curved.evaluate(face, bary)
     across = cut.across(track.face, normals)
@@ -72,17 +95,8 @@ def raster(curved: CurvedSurface, setup: Setup) -> ToolPath:
         aside = smoothed(track, points, across, spacing)
         face, bary, points, normals = _moved(curved, face, bary, points, aside[:, None] * across)
     travel = _travel(track, points, normals, across, spacing, cut.exact)
-    data = DataRuns(
-        points,
-        normals,
-        travel,
-        surface.part_faces[face],
-        bary,
-        track.run,
-        headings(points, normals, travel, track.run, across),
-    )
-    path = assemble(data, "inspection", setup.standoff_mm, spacing)
-    return with_links(path, curved, setup)
+    heading = headings(points, normals, travel, track.run, across)
+    return DataRuns(points, normals, travel, curved.surface.part_faces[face], bary, track.run, heading)
 
 
 def acquisition_spacing_mm(setup: Setup) -> float:

@@ -8,7 +8,7 @@ from numpy.typing import NDArray
 
 from planner.frames import Array
 from planner.path.axes import ScanAxes
-from planner.path.cut import Cut, surface_samples, tangent
+from planner.path.cut import Cut, surface_samples, tangent, towards_higher
 from planner.path.field import guide_distance
 from planner.path.holes import fill_holes
 from planner.path.isolines import isolines, neighbours
@@ -34,7 +34,7 @@ def geodesic_cut(curved: CurvedSurface, mesh: PathMesh, axes: ScanAxes, setup: S
     """
     guided = _guided(mesh, axes)
     fine, d, cut_mesh = guided.fine, guided.distance, guided.mesh
-    towards = _towards_higher(fine, d)
+    towards = towards_higher(fine, d)
     s = surface_samples(curved, cut_mesh, fine)
     half = effective_half_mm(s.shape, tangent(towards[s.face], s.normals), setup)
     v = np.einsum("nk,nk->n", d[fine.faces[s.face]], s.bary)
@@ -104,13 +104,3 @@ def _guide_offset(whole: Subdivision, height: Array) -> float:
     np.maximum.at(length, chains.level, np.bincount(chains.chain, np.linalg.norm(step, axis=1)))
     best = int(np.argmax(np.round(length / length.max(), 6) - 0.2 * np.abs(share - 0.5)))
     return lo + float(share[best]) * (hi - lo)
-
-
-def _towards_higher(fine: Subdivision, d: Array) -> Array:
-    """Return the direction (f, 3) in which the distance grows in each triangle; zero where it is flat."""
-    a, b, c = (fine.vertices[fine.faces[:, k]] for k in range(3))
-    da, db, dc = (d[fine.faces[:, k]] for k in range(3))
-    n = np.cross(b - a, c - a)
-    g = (db - da)[:, None] * np.cross(n, a - c) + (dc - da)[:, None] * np.cross(n, b - a)
-    length = np.linalg.norm(g, axis=1, keepdims=True)
-    return np.divide(g, length, out=np.zeros_like(g), where=length > 0)
