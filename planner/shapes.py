@@ -40,6 +40,8 @@ class KeepOutBase(Strict):
     """Distance that the TCP keeps from it while data are taken (mm)."""
     may_cross: bool = True
     """The tool may pass over it (a fastener). False: nothing of the nozzle ever comes above it (a clamp)."""
+    height_mm: PositiveMm | None = None
+    """How high it stands above the surface (mm): nozzle and wrist keep clear of that, wherever they go; null: not known."""
 
 
 class SphereKeepOut(KeepOutBase):

@@ -5,7 +5,7 @@ import numpy as np
 from planner.checks.clearance import Envelope
 from planner.checks.collision import path_clearance
 from planner.checks.fixture import fixture_reach_mm
-from planner.checks.keepout import keep_out_gap_mm
+from planner.checks.keepout import keep_out_gap_mm, keep_out_wrist_mm
 from planner.checks.motion import robot_motion
 from planner.checks.path_check import PathCheck
 from planner.checks.say import say_clearance, say_fixture, say_seen
@@ -31,15 +31,23 @@ def check(curved: CurvedSurface, path: ToolPath, setup: Setup, robot: Robot | No
     """
     arm = load_robot(setup.robot) if robot is None else robot
     what = seen(curved, path, setup)
-    clear = path_clearance(solid_of(curved.surface.part), path, envelope(setup, arm), 0.0)
+    moving = envelope(setup, arm)
+    clear = path_clearance(solid_of(curved.surface.part), path, moving, 0.0)
     beside, crossed = keep_out_gap_mm(curved, path, setup)
+    wrist_off, touched = keep_out_wrist_mm(curved, path, setup, moving)
     fixture = fixture_reach_mm(curved, path, setup)
     motion = robot_motion(arm, path, setup)
     issues: list[Issue] = []
     if len(path) == 0:
         issues.append(Issue("error", "path-empty", f"The {path.kind} path has no poses.", "Plan it first.", path.kind))
     else:
-        issues += say_seen(path, setup, what) + say_clearance(path, clear) + crossed + say_fixture(path, setup, fixture)
+        issues += (
+            say_seen(path, setup, what)
+            + say_clearance(path, clear)
+            + crossed
+            + touched
+            + say_fixture(path, setup, fixture)
+        )
         issues += say_robot(arm, path, setup, motion)
     issues.sort(key=lambda issue: _ORDER[issue.severity])
     found = motion.reach
@@ -51,7 +59,7 @@ def check(curved: CurvedSurface, path: ToolPath, setup: Setup, robot: Robot | No
         what.sagitta_mm,
         what.effective_swath_mm,
         clear.nozzle_mm,
-        clear.wrist_mm,
+        np.minimum(clear.wrist_mm, wrist_off),
         beside,
         fixture,
         found.axes_deg,

@@ -14,11 +14,12 @@ class PathCheck:
     """Findings on a path of n poses; every array has n rows, NaN where a quantity does not apply.
 
     tilt_deg, standoff_mm, curvature_loss_db, sagitta_mm, effective_swath_mm: what the ultrasound sees (data poses).
-    clearance_mm: nozzle to part, at the pose and on the way to the next, a lower bound; wrist_clearance_mm likewise.
-    keep_out_mm: nozzle beside what must not be crossed, at the pose and on the way to the next; inf where nothing is.
-    fixture_mm: two sigma of the fixture's tolerance along the normal. axes_deg (n, 6): robot axes. reachable, singular,
-    jumped (n,). margin_deg: to the nearest axis limit. speed_share: axis speed to the next pose over its limit.
-    status, turn: KUKA's, of the first pose. robot: name of the robot file. issues: collected, most severe first.
+    clearance_mm: nozzle to part, at the pose and on the way to the next, a lower bound; wrist_clearance_mm likewise, and
+    to keep-outs of known height. keep_out_mm: nozzle beside what must not be crossed or stands there, at the pose and on
+    the way to the next; inf where nothing is. fixture_mm: two sigma of the fixture's tolerance along the normal. axes_deg
+    (n, 6): robot axes. reachable, singular, jumped (n,). margin_deg: to the nearest axis limit. speed_share: axis speed
+    to the next pose over its limit. status, turn: KUKA's, of the first pose. robot: name of the robot file. issues:
+    collected, most severe first.
     """
 
     tilt_deg: Array

@@ -1,7 +1,7 @@
 """Ways beside the columns above keep-outs that must not be crossed."""
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -28,7 +28,8 @@ class Detours:
 
     @classmethod
     def of(cls, columns: Sequence[Column], setup: Setup) -> "Detours":
-        """Return the detours of a setup's nozzle."""
+        """Return the detours of a setup's nozzle, which keeps the margin above what it may pass over as well."""
+        columns = [replace(c, top_mm=c.top_mm + c.margin_mm) for c in columns]
         return cls(tuple(columns), setup.tool.nozzle_radius_mm, setup.tool.nozzle_length_mm)
 
     def gap_mm(self, tips: Array, ups: Array) -> Array:

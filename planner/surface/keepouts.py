@@ -33,10 +33,10 @@ _ROWS = 4096
 
 @dataclass(frozen=True, eq=False)
 class Column:
-    """What stands above a keep-out: a prism without end along `up` (3,) over an outline, above its foot; mm, `part`.
+    """What stands above a keep-out: a prism along `up` (3,) over an outline, from its foot to its top; mm, `part`.
 
     outline (m, 2): corners in the axes first, second (3,) about `origin` (3,); the prism is this wide and `radius_mm`
-    more. foot_mm: where it begins along `up`.
+    more. foot_mm, top_mm: where it begins and ends along `up`; one without end has an infinite top.
     """
 
     name: str
@@ -48,6 +48,7 @@ class Column:
     radius_mm: float
     foot_mm: float
     margin_mm: float
+    top_mm: float = np.inf
 
     def flat(self, points: Array) -> Array:
         """Return points (n, 3) in the plane of the outline (n, 2)."""
@@ -55,30 +56,48 @@ class Column:
         return np.stack([d @ self.first, d @ self.second], axis=-1)
 
     def gap_mm(self, tip: Array, tail: Array, radius_mm: float) -> Array:
-        """Return how far rods from tip to tail (n, 3), this thick, stay beside the column (n,), mm; inf below its foot."""
+        """Return how far rods from tip to tail (n, 3), this thick, stay beside the column (n,), mm; inf below and above it."""
         low, high = ((p - self.origin) @ self.up - self.foot_mm + radius_mm for p in (tip, tail))
         under = np.maximum(low, high) < 0.0
         # Only what of the rod stands above the foot counts.
-        span = np.where(np.abs(high - low) > 1e-12, high - low, 1.0)
-        cut = np.clip(-low / span, 0.0, 1.0)[:, None]
-        at = tip + cut * (tail - tip)
-        start = np.where((low < 0.0)[:, None], at, tip)
-        end = np.where((high < 0.0)[:, None], at, tail)
+        start, end = self._beyond(tip, tail, low, high)
+        if np.isfinite(self.top_mm):
+            d = tail - tip
+            lean2 = 1.0 - (d @ self.up) ** 2 / np.maximum(np.einsum("ij,ij->i", d, d), 1e-12)
+            # The ends of a rod are flat: leaning, their rims hang below their middles.
+            hang = radius_mm * np.sqrt(np.maximum(lean2, 0.0))
+            low, high = (self.top_mm - (p - self.origin) @ self.up + hang for p in (start, end))
+            under |= np.maximum(low, high) < 0.0
+            start, end = self._beyond(start, end, low, high)
         gap = segment_distance_mm(self.flat(start), self.flat(end), self.outline) - self.radius_mm - radius_mm
         return np.where(under, np.inf, gap)
+
+    def _beyond(self, a: Array, b: Array, at_a: Array, at_b: Array) -> tuple[Array, Array]:
+        """Return what of the ways from a to b (n, 3) lies where a height, at_a to at_b (n,), is not negative."""
+        span = np.where(np.abs(at_b - at_a) > 1e-12, at_b - at_a, 1.0)
+        zero = a + np.clip(-at_a / span, 0.0, 1.0)[:, None] * (b - a)
+        return np.where((at_a < 0.0)[:, None], zero, a), np.where((at_b < 0.0)[:, None], zero, b)
+
+    def ball_gap_mm(self, centres: Array, radius_mm: float) -> Array:
+        """Return how far balls about centres (n, 3), this large, stay off the column (n,), mm; negative where they touch."""
+        height = (centres - self.origin) @ self.up
+        end = np.maximum(self.foot_mm - height, height - self.top_mm)
+        return _prism(signed_distance_mm(self.flat(centres), self.outline) - self.radius_mm, end) - radius_mm
 
 
 @dataclass(frozen=True, eq=False)
 class KeepOuts:
     """The keep-out regions of a setup on one part.
 
-    shapes: as given. up (k, 3): outward normal of the surface at each. nozzle_mm: radius of the nozzle.
+    shapes: as given. up (k, 3): outward normal of the surface at each. nozzle_mm: radius of the nozzle; standoff_mm: the
+    least at which it passes.
     """
 
     part: Part
     shapes: tuple[KeepOut, ...]
     up: Array
     nozzle_mm: float
+    standoff_mm: float = np.inf
 
     def __len__(self) -> int:
         return len(self.shapes)
@@ -116,7 +135,7 @@ class KeepOuts:
         out = self.gaps_mm(points) if gaps_mm is None else gaps_mm.copy()
         for i, shape in enumerate(self.shapes):
             need = max(shape.margin_mm - give_mm, 0.0)
-            out[i] -= need if shape.may_cross else shape.margin_mm + self.nozzle_mm + ahead_mm
+            out[i] -= shape.margin_mm + self.nozzle_mm + ahead_mm if self._in_the_way(shape) else need
         return out
 
     @property
@@ -125,10 +144,24 @@ class KeepOuts:
         sizes = [max(_size_mm(s) + 2.0 * s.margin_mm, 0.2) for s in self.shapes]
         return min(sizes, default=np.inf)
 
+    def _in_the_way(self, shape: KeepOut) -> bool:
+        """Return whether a nozzle that takes data has to pass beside: over it is forbidden, or lower than it is high."""
+        high = shape.height_mm is not None and shape.height_mm + shape.margin_mm > self.standoff_mm
+        return not shape.may_cross or high
+
     @cached_property
     def columns(self) -> tuple[Column, ...]:
-        """The columns above the regions that must not be crossed."""
-        return tuple(self._column(i) for i, s in enumerate(self.shapes) if not s.may_cross)
+        """What the nozzle keeps off: without end above regions that must not be crossed, as high as they are above others."""
+        return tuple(
+            self._column(i, None if s.may_cross else np.inf)
+            for i, s in enumerate(self.shapes)
+            if not s.may_cross or s.height_mm
+        )
+
+    @cached_property
+    def obstacles(self) -> tuple[Column, ...]:
+        """What stands on the regions whose height is known, as high as it is."""
+        return tuple(self._column(i, None) for i, s in enumerate(self.shapes) if s.height_mm)
 
     def label(self, index: int) -> str:
         """Return what to call a region."""
@@ -212,7 +245,8 @@ class KeepOuts:
         inside = np.clip(corners[meets].reshape(-1, 3), low, high)
         return np.stack([inside.min(axis=0), inside.max(axis=0)])
 
-    def _column(self, index: int) -> Column:
+    def _column(self, index: int, top_mm: float | None) -> Column:
+        """Return the column above a region, up to a top; None: as high as the region says it is."""
         shape, up = self.shapes[index], self.up[index]
         first, second = _frame(up)
         radius = 0.0
@@ -228,8 +262,10 @@ class KeepOuts:
         flat = np.stack([(corners - origin) @ first, (corners - origin) @ second], axis=1)
         if not isinstance(shape, PolygonKeepOut) and len(flat) > 3:
             flat = _hull(flat)
-        foot = float(((corners - origin) @ up).min()) - radius
-        return Column(self.label(index), origin, up, first, second, flat, radius, foot, shape.margin_mm)
+        heights = (corners - origin) @ up
+        foot = float(heights.min()) - radius
+        top = float(heights.max()) + (shape.height_mm or 0.0) if top_mm is None else top_mm
+        return Column(self.label(index), origin, up, first, second, flat, radius, foot, shape.margin_mm, top)
 
 
 _KNOWN: "WeakKeyDictionary[InspectionSurface, tuple[object, KeepOuts]]" = WeakKeyDictionary()
@@ -240,12 +276,13 @@ def keep_outs_of(surface: InspectionSurface, setup: Setup) -> KeepOuts:
 
     Raises EchoBaseError `keep-out-faces` for triangles that the part does not have.
     """
-    key = (setup.inspection.keep_outs, setup.tool.nozzle_radius_mm)
+    standoff = min(setup.standoff_mm, setup.alignment_standoff_mm)
+    key = (setup.inspection.keep_outs, setup.tool.nozzle_radius_mm, standoff)
     known = _KNOWN.get(surface)
     if known is None or known[0] != key:
         nearest = _Nearest(surface)
         up = np.array([_up(surface, nearest, s, i) for i, s in enumerate(key[0])]).reshape(-1, 3)
-        known = _KNOWN[surface] = (key, KeepOuts(surface.part, key[0], up, key[1]))
+        known = _KNOWN[surface] = (key, KeepOuts(surface.part, key[0], up, key[1], standoff))
     return known[1]
 
 
