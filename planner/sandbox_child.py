@@ -38,12 +38,20 @@ def main(folder: str) -> None:
 def _limit(limits: dict[str, Any]) -> None:
     memory, size, cpu = int(limits["memory_mb"]) * MB, int(limits["file_mb"]) * MB, int(limits["cpu_s"])
     resource.setrlimit(resource.RLIMIT_CORE, (0, 0))
-    resource.setrlimit(resource.RLIMIT_AS, (memory, memory))
-    resource.setrlimit(resource.RLIMIT_FSIZE, (size, size))
+    _at_most(resource.RLIMIT_AS, memory, memory)
+    _at_most(resource.RLIMIT_FSIZE, size, size)
     # The soft limit says SIGXCPU, which is told apart from a crash; the hard one follows for those that ignore it.
-    resource.setrlimit(resource.RLIMIT_CPU, (cpu, cpu + 5))
+    _at_most(resource.RLIMIT_CPU, cpu, cpu + 5)
     if sys.platform == "linux":
         ctypes.CDLL(None).prctl(PR_SET_PDEATHSIG, signal.SIGKILL)
+
+
+def _at_most(kind: int, soft: int, hard: int) -> None:
+    """Set a limit, or leave it where the one who started us set a tighter one."""
+    _, given = resource.getrlimit(kind)
+    if given != resource.RLIM_INFINITY:
+        soft, hard = min(soft, given), min(hard, given)
+    resource.setrlimit(kind, (soft, hard))
 
 
 def _call(work: Path, request: dict[str, Any]) -> dict[str, Any]:

@@ -13,6 +13,7 @@ from planner.cad.size import expect_size, expect_unit
 from planner.cad.step import CHORD_PER_TOLERANCE, FINEST_MM, complaint
 from planner.errors import EchoBaseError, fail
 from planner.frames import Array
+from planner.memory import READ_BYTES, expect_memory
 from planner.part import Part, Provenance
 from planner.sandbox import SandboxLimits, run_limited
 from planner.surface.topology import Index
@@ -39,14 +40,15 @@ def read_part(source: Path, name: str, unit: str | None, limits: SandboxLimits |
     STEP is meshed to a chord error of 0.01 mm or, where that exceeds the budget, as fine as it allows, with a note.
 
     Raises EchoBaseError: `part-missing`, `part-format`, `part-mismatch`, `part-empty`, `part-truncated`, `part-damaged`,
-    `part-not-a-mesh`, `part-too-big`, `part-size`, `part-far`, `unit-missing`, `unit-unknown`, `unit-contradicts`,
-    `step-messages` and those of `planner.sandbox.run_limited`.
+    `part-not-a-mesh`, `part-too-big`, `part-memory`, `part-size`, `part-far`, `unit-missing`, `unit-unknown`,
+    `unit-contradicts`, `step-messages` and those of `planner.sandbox.run_limited`.
     """
     shown = Path(name.replace("\\", "/")).name or name
     digest, head, size = _fingerprint(source, shown)
     kind = format_of(shown, head, size)
     arrays, meta = _parse(source, kind, shown, limits)
     vertices, faces = _triangles(arrays, shown)
+    expect_memory(len(faces), READ_BYTES, "Reading a part of", shown)
     scale = 1.0 if kind == "step" else None
     own = expect_unit(kind, unit, meta.get("file_unit"), np.ptp(vertices, axis=0), shown)
     vertices = vertices * (mm_per(own) if scale is None else scale)

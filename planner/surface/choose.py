@@ -6,6 +6,7 @@ from numpy.typing import ArrayLike
 from planner.errors import fail
 from planner.frames import Array
 from planner.issues import Issue
+from planner.memory import PLAN_BYTES, expect_memory
 from planner.part import Part
 from planner.setup import Setup
 from planner.shapes import Brush
@@ -21,13 +22,14 @@ def chosen_surface(part: Part, setup: Setup, seeds_part: ArrayLike | None = None
 
     seeds_part (n, 3), mm: clicks and key points to flood from; without any, the dabs of paint; without
     these, the largest smooth region (inside the box, if there is one; ties to the one facing +Z of base). Errors: those
-    of `inspection_surface`, and `surface-clipped`.
+    of `inspection_surface`, `surface-clipped`, and `part-memory` before the machine swaps.
     """
     up_part = setup.T_base_partnom.inv().directions([0.0, 0.0, 1.0])
     given = np.asarray([] if seeds_part is None else seeds_part, dtype=np.float64).reshape(-1, 3)
     inspection = setup.inspection
     seeds = given if len(given) else _dabbed(part, inspection.paint)
     flooded = inspection_surface(part, seeds if len(seeds) else None, up_part, box=inspection.box)
+    expect_memory(len(flooded.part_faces), PLAN_BYTES, "Planning on a surface of", "inspection surface")
     return clipped(flooded, inspection, seeds if len(seeds) else None, footprint_mm(setup.probe))
 
 
