@@ -72,14 +72,18 @@ def time(t_s: Array, name: str) -> Array:
     return t_s
 
 
-def poses(values: Array, name: str) -> None:
-    """Refuse poses that are not numbers, do not move, or are plainly in metres. values (m, 6), mm and deg."""
+def poses(values: Array, name: str, first: NDArray[np.integer] | None = None) -> None:
+    """Refuse poses that are not numbers, do not move, or are plainly in metres.
+
+    values (m, 6), mm and deg. first (m,): the first reading of each pose, from 0; None: there is one row a pose.
+    """
     finite = np.isfinite(values)
     if not finite.all():
         row, axis = np.argwhere(~finite)[0]
+        at = f"pose {row + 1}" if first is None else f"reading {first[row] + 1}"
         raise fail(
             "pose-missing",
-            f"column '{POSE[axis]}' is empty or not finite (first at pose {row + 1}).",
+            f"column '{POSE[axis]}' is empty or not finite (first at {at}).",
             "A reading without a pose cannot be used: leave out its row.",
             name,
         )

@@ -12,6 +12,7 @@ from alignment.readers.tables import payload
 from planner.errors import EchoBaseError, fail
 
 HEADER_BYTES = 65_536
+CUT_REMEDY = "The file seems cut short: export or copy it again whole."
 
 
 def parse_csv(source: Path, name: str) -> dict[str, Any]:
@@ -19,7 +20,10 @@ def parse_csv(source: Path, name: str) -> dict[str, Any]:
     header_line, skip = _header(source, name)
     columns = next(csv.reader([header_line]))
     found = layout([column for column in columns if column.strip()], name)
-    return payload(found, _columns(source, name, columns, found, skip), name)
+    table = _columns(source, name, columns, found, skip)
+    if any(column.len() and column[-1] is None for column in table.values()):
+        _refuse_cut(source, name, columns)
+    return payload(found, table, name)
 
 
 def _header(source: Path, name: str) -> tuple[str, int]:
@@ -30,7 +34,7 @@ def _header(source: Path, name: str) -> tuple[str, int]:
         with gzip.open(source, "rb") if gzipped else source.open("rb") as stream:
             head = stream.read(HEADER_BYTES)
     except (OSError, EOFError) as error:
-        raise fail("scan-unreadable", f"the compressed file is damaged ({error}).", "Copy it again.", name) from error
+        raise _damaged(name, error) from error
     if head.startswith((b"\xff\xfe", b"\xfe\xff")):
         raise fail("csv-encoding", "the text is UTF-16.", "Save it as UTF-8 CSV.", name)
     text = head.decode("utf-8-sig", errors="replace")
@@ -40,6 +44,30 @@ def _header(source: Path, name: str) -> tuple[str, int]:
             _check_separators(line, lines[number + 1] if number + 1 < len(lines) else "", name)
             return line, number
     raise fail("scan-empty", "the file is empty.", "Export the scan again with one header line and its readings.", name)
+
+
+def _damaged(name: str, error: Exception) -> EchoBaseError:
+    return fail("scan-unreadable", f"the compressed file is damaged or cut short ({error}).", "Copy it again.", name)
+
+
+def _refuse_cut(source: Path, name: str, columns: list[str]) -> None:
+    """Refuse a file whose last row ends before its last column; a lost echo at the end keeps its commas."""
+    number, last = 0, b""
+    with source.open("rb") as raw:
+        gzipped = raw.read(2) == b"\x1f\x8b"
+    with gzip.open(source, "rb") if gzipped else source.open("rb") as stream:
+        for at, line in enumerate(stream, start=1):
+            if line.strip() and not line.lstrip().startswith(b"#"):
+                number, last = at, line
+    cells = next(csv.reader([last.decode("utf-8-sig", errors="replace").strip()]))
+    if len(cells) < len(columns):
+        ends = columns[len(cells) - 1].strip()
+        raise fail(
+            "csv-cut",
+            f"line {number}, the last one, has {len(cells)} of {len(columns)} cells and ends in column '{ends}'.",
+            CUT_REMEDY,
+            name,
+        )
 
 
 def _check_separators(header: str, first_row: str, name: str) -> None:
@@ -80,6 +108,8 @@ def _columns(source: Path, name: str, columns: list[str], found: Layout, skip: i
         raise fail("scan-empty", "the file has a header but no readings.", "Export the scan again.", name) from error
     except pl.exceptions.PolarsError as error:
         raise _cell_error(source, name, wanted, options, skip, error) from error
+    except OSError as error:
+        raise _damaged(name, error) from error
     return {key: frame.get_column(spelled) for key, spelled in found.spelled.items()}
 
 

@@ -51,7 +51,7 @@ def parser_of(path: Path, name: str) -> str:
     for magic, parser in BY_MAGIC:
         if head.startswith(magic):
             return parser
-    if b"," in head.split(b"\n", 1)[0] and b"\0" not in head:
+    if b"," in head.split(b"\n", 1)[0] and b"\0" not in head and head.lstrip()[:1] not in (b"{", b"["):
         return CSV
     known = ", ".join(sorted(BY_SUFFIX))
     raise fail("scan-format", "the format is not known.", f"EchoBase reads {known}.", name)

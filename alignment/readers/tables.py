@@ -58,7 +58,7 @@ def _poses(columns: Mapping[str, Any], name: str) -> dict[str, Any]:
     for values in six:
         new[1:] |= values[1:] != values[:-1]
     poses = np.stack([values[new] for values in six], axis=1)
-    checks.poses(poses, name)
+    checks.poses(poses, name, np.flatnonzero(new))
     pose_index = np.cumsum(new, dtype=np.int32) - np.int32(1)
     return {"poses": poses, "pose_index": pose_index}
 
@@ -97,9 +97,10 @@ def _whole(column: Any, key: str, name: str) -> NDArray[np.int32]:
     bad = ~(np.abs(values) < 2**31) | (values != np.rint(values))
     if bad.any():
         row = int(np.argmax(bad))
+        what = f"{values[row]:g} is not a whole number" if np.isfinite(values[row]) else "the cell is empty"
         raise fail(
             f"{key}-not-whole",
-            f"column '{key}', reading {row + 1}: {values[row]:g} is not a whole number.",
+            f"column '{key}', reading {row + 1}: {what}.",
             f"Every reading needs its {key} number; leave out rows of lost echoes, or leave their tof_us empty.",
             name,
         )

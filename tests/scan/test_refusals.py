@@ -90,12 +90,50 @@ def test_a_robot_that_does_not_move(tmp_path) -> None:
     assert refusal(tmp_path, csv_text(**still)).code == "poses-all-equal"
 
 
+@pytest.mark.parametrize("kept", [5, 25, 50])
+def test_a_file_cut_in_its_last_row_is_named_with_line_and_column(tmp_path, kept) -> None:
+    lines = csv_text().splitlines()
+    whole, last = "\n".join(lines[:12]), lines[12]
+    part = last[: len(last) * kept // 60]
+    issue = refusal(tmp_path, f"{whole}\n{part}")
+    cells = len(part.split(","))
+    assert issue.code == "csv-cut"
+    assert f"line 13, the last one, has {cells} of 9 cells and ends in column '{lines[0].split(',')[cells - 1]}'" in (
+        issue.message
+    )
+    packed = gzip.compress(f"{whole}\n{part}".encode())
+    assert refusal(tmp_path, packed, "scan.csv.gz").code == "csv-cut"
+    assert refusal(tmp_path, packed[:-30], "scan.csv.gz").code == "scan-unreadable"
+
+
+def test_a_lost_echo_in_the_last_row_is_no_cut(tmp_path) -> None:
+    lines = csv_text().splitlines()
+    lines[-1] = ",".join([*lines[-1].split(",")[:-2], "", ""])
+    path = tmp_path / "scan.csv"
+    path.write_text("\n".join(lines) + "\n# end\n")
+    assert np.isnan(read_scan([path]).tof_us[-1])
+
+
+def test_an_empty_law_says_so(tmp_path) -> None:
+    law = columns()["law"].astype(float)
+    law[6] = np.nan
+    assert refusal(tmp_path, csv_text(law=law)).message == "column 'law', reading 7: the cell is empty."
+
+
+def test_json_is_no_scan(tmp_path) -> None:
+    path = tmp_path / "setup.json"
+    path.write_text('{"standoff_mm": 3, "tool": {"number": 1, "beam_axis": "z"}}')
+    with pytest.raises(EchoBaseError, match="format is not known"):
+        read_scan([path])
+
+
 def test_a_pose_that_is_missing(tmp_path) -> None:
     y = columns()["y_mm"].astype(float)
     y[4:8] = np.nan
     issue = refusal(tmp_path, csv_text(y_mm=y))
     assert issue.code == "pose-missing"
     assert "y_mm" in issue.message
+    assert "reading 5" in issue.message
 
 
 def test_laws_below_one_and_not_whole(tmp_path) -> None:
