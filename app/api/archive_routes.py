@@ -12,6 +12,7 @@ from app.api.errors import documented
 from app.api.etags import tag
 from app.api.models import Project
 from app.api.receive import receive
+from app.api.upload_body import one_file, upload_body
 from app.store.archive import archive, manifest_of
 from app.store.journal import first_broken, lines
 from app.store.projects import get
@@ -21,21 +22,7 @@ from app.store.tables import ProjectRow
 
 router = APIRouter(tags=["archive"])
 ZIP: dict[int | str, dict[str, Any]] = {200: {"content": {"application/zip": {}}}}
-IMPORT_BODY: dict[str, Any] = {
-    "requestBody": {
-        "required": True,
-        "content": {
-            "multipart/form-data": {
-                "schema": {
-                    "type": "object",
-                    "required": ["file"],
-                    "properties": {"file": {"type": "string", "format": "binary"}},
-                }
-            },
-            "application/zip": {"schema": {"type": "string", "format": "binary"}},
-        },
-    }
-}
+IMPORT_BODY = upload_body(one_file(), bare="application/zip")
 
 
 @router.get("/projects/{project_id}/archive", responses=documented(404) | ZIP, response_class=StreamingResponse)

@@ -12,6 +12,7 @@ from pydantic import BaseModel, Field
 from app.api.context import Context, Ctx, ProjectId
 from app.api.errors import IssueBody, documented
 from app.api.receive import Received, receive
+from app.api.upload_body import choice, files, upload_body
 from app.jobs.specs import suffix_of
 from app.store import inputs, projects
 from app.store.refusal import refuse
@@ -35,29 +36,10 @@ ENDED = {
         "Check kind, columns and units, or record again.",
     ),
 }
-UPLOAD_BODY: dict[str, Any] = {
-    "requestBody": {
-        "required": True,
-        "content": {
-            "multipart/form-data": {
-                "schema": {
-                    "type": "object",
-                    "required": ["file"],
-                    "properties": {
-                        "file": {
-                            "type": "array",
-                            "items": {"type": "string", "format": "binary"},
-                            "description": "One file or more, taken together; tcp: one scan, of one file or two.",
-                        },
-                        "target": {"type": "string", "enum": ["plane", "sphere"], "example": "plane"},
-                        "radius_mm": {"type": "number", "example": 20.0},
-                    },
-                }
-            },
-            "application/octet-stream": {"schema": {"type": "string", "format": "binary"}},
-        },
-    }
-}
+UPLOAD_BODY = upload_body(
+    files("One file or more, taken together; tcp: one scan, of one file or two."),
+    {"target": choice("plane", "sphere", example="plane"), "radius_mm": {"type": "number", "example": 20.0}},
+)
 
 
 class CalibratedValue(BaseModel):

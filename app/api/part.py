@@ -1,7 +1,7 @@
 """Routes of the part: upload, and what is known of it."""
 
 import asyncio
-from typing import Annotated, Any, cast
+from typing import Annotated, cast
 
 from fastapi import APIRouter, Query, Request, Response
 
@@ -11,30 +11,16 @@ from app.api.etags import IfMatch, expected, tag
 from app.api.models import PartInfo
 from app.api.parts import info_of, keep_part
 from app.api.receive import receive
+from app.api.upload_body import choice, one_file, upload_body
 from app.store import inputs, projects
 from app.store.refusal import refuse
 from planner.units import LENGTH_UNITS, LengthUnit
 
 router = APIRouter(prefix="/projects/{project_id}", tags=["part"])
 
-UPLOAD_BODY: dict[str, Any] = {
-    "requestBody": {
-        "required": True,
-        "content": {
-            "multipart/form-data": {
-                "schema": {
-                    "type": "object",
-                    "required": ["file"],
-                    "properties": {
-                        "file": {"type": "string", "format": "binary", "description": "STEP, STL, OBJ, PLY or GLB."},
-                        "unit": {"type": "string", "enum": ["mm", "cm", "m", "inch"], "example": "mm"},
-                    },
-                }
-            },
-            "application/octet-stream": {"schema": {"type": "string", "format": "binary"}},
-        },
-    }
-}
+UPLOAD_BODY = upload_body(
+    one_file("STEP, STL, OBJ, PLY or GLB."), {"unit": choice("mm", "cm", "m", "inch", example="mm")}
+)
 
 
 @router.put("/part", responses=documented(404, 412, 413, 507), openapi_extra=UPLOAD_BODY)

@@ -11,6 +11,7 @@ from app.api.downloads import disposition
 from app.api.errors import documented
 from app.api.models import Scan
 from app.api.receive import Received, receive
+from app.api.upload_body import choice, files, upload_body
 from app.store import inputs, projects, scans
 from app.store.blobs import Blob
 from app.store.content import chunks
@@ -21,33 +22,13 @@ from app.store.tables import ScanRow
 
 router = APIRouter(prefix="/projects/{project_id}/scans", tags=["scans"])
 BaseName = Literal["nominal", "corrected"]
-UPLOAD_BODY: dict[str, Any] = {
-    "requestBody": {
-        "required": True,
-        "content": {
-            "multipart/form-data": {
-                "schema": {
-                    "type": "object",
-                    "required": ["file"],
-                    "properties": {
-                        "file": {
-                            "type": "array",
-                            "items": {"type": "string", "format": "binary"},
-                            "description": "One file, or two: poses and readings.",
-                        },
-                        "base": {"type": "string", "enum": ["nominal", "corrected"], "example": "nominal"},
-                        "path": {
-                            "type": "string",
-                            "enum": ["alignment", "inspection", "corrected"],
-                            "example": "alignment",
-                        },
-                    },
-                }
-            },
-            "application/octet-stream": {"schema": {"type": "string", "format": "binary"}},
-        },
-    }
-}
+UPLOAD_BODY = upload_body(
+    files("One file, or two: poses and readings."),
+    {
+        "base": choice("nominal", "corrected", example="nominal"),
+        "path": choice("alignment", "inspection", "corrected", example="alignment"),
+    },
+)
 
 
 @router.post("", status_code=status.HTTP_201_CREATED, responses=documented(404, 413, 507), openapi_extra=UPLOAD_BODY)

@@ -1,11 +1,14 @@
 """The real server, as a process of its own that can be killed and started again on the same data."""
 
+import json
 import os
 import re
 import subprocess
 import sys
 import threading
+import urllib.request
 from pathlib import Path
+from typing import Any
 
 ROOT = Path(__file__).parents[2]
 START = """
@@ -44,6 +47,22 @@ class RealServer:
             if found := re.search(r"http://127\.0\.0\.1:(\d+)/", line):
                 self.port = int(found[1])
                 self._up.set()
+
+    def rest(self, path: str, method: str = "GET", body: Any = None) -> Any:
+        """Send JSON to an address below /api/v1; return what is answered."""
+        sent = None if body is None else json.dumps(body).encode()
+        headers = {"Content-Type": "application/json"}
+        request = urllib.request.Request(f"{self.url}/api/v1{path}", sent, headers, method=method)
+        with urllib.request.urlopen(request) as answer:
+            text = answer.read()
+        return json.loads(text) if text else None
+
+    def worked(self, path: str, body: Any) -> None:
+        """Start a job and wait until it is done."""
+        job = self.rest(path, "POST", body)
+        with urllib.request.urlopen(f"{self.url}/api/v1/jobs/{job['id']}/events") as events:
+            events.read()
+        assert self.rest(f"/jobs/{job['id']}")["state"] == "done"
 
     def kill(self) -> None:
         """End it without a word, as a power cut would."""

@@ -1,8 +1,5 @@
 """A calibration in the page: files in, values and curve seen, the patch put in force and taken back."""
 
-import json
-import urllib.request
-
 import pytest
 
 from tests.api.test_calibrations import couplant_csv, tilt_csv
@@ -19,21 +16,13 @@ def server(tmp_path_factory):
     made.stop()
 
 
-def rest(server, path, method="GET", body=None):
-    sent = None if body is None else json.dumps(body).encode()
-    headers = {"Content-Type": "application/json"}
-    request = urllib.request.Request(f"{server.url}/api/v1{path}", sent, headers, method=method)
-    with urllib.request.urlopen(request) as answer:
-        return json.load(answer)
-
-
 def give(page, name, content):
     files = page.locator('input[name="calibration-files"]')
     files.set_input_files({"name": name, "mimeType": "text/csv", "buffer": content})
 
 
 def test_calibrate_see_use_and_undo(server, chromium, tmp_path):
-    pid = rest(server, "/projects", "POST", {"name": "Cell"})["id"]
+    pid = server.rest("/projects", "POST", {"name": "Cell"})["id"]
     context = chromium.new_context(viewport={"width": 1024, "height": 900}, accept_downloads=True)
     page = context.new_page()
     page.watch = Watch(server.url).on(page)
@@ -42,7 +31,7 @@ def test_calibrate_see_use_and_undo(server, chromium, tmp_path):
     page.locator('[data-key="calibrate-probe"]').click()
 
     def losses():
-        return rest(server, f"/projects/{pid}/setup")["probe"]["tilt_loss_db_per_deg2"]
+        return server.rest(f"/projects/{pid}/setup")["probe"]["tilt_loss_db_per_deg2"]
 
     before = losses()
     # A file of another kind is a sentence, and the tab stays usable.
@@ -76,9 +65,9 @@ def test_calibrate_see_use_and_undo(server, chromium, tmp_path):
     # Somebody else changes the cell: the patch is of an earlier one and can no longer be used by a wrong click.
     use.wait_for()
     until(page, use.is_enabled, what="the offer to use it again")
-    other = rest(server, f"/projects/{pid}/setup")
+    other = server.rest(f"/projects/{pid}/setup")
     other["tool"]["tcp"]["z_mm"] = 123.0
-    rest(server, f"/projects/{pid}/setup", "PUT", other)
+    server.rest(f"/projects/{pid}/setup", "PUT", other)
     page.get_by_text("The cell was changed since.").wait_for()
     assert use.is_disabled()
     assert losses() == before

@@ -1,7 +1,6 @@
 """The whole job in the page, against the real server: from the sample part to a corrected program on disk."""
 
 import io
-import json
 import re
 import urllib.request
 import zipfile
@@ -32,11 +31,8 @@ def server(tmp_path_factory):
 @pytest.fixture(scope="module")
 def pid(server):
     """A planned flat plate, for the tests that leave it as it is."""
-    made = rest(server, "/projects", "POST", {"name": "Plate", "sample": "flat-plate"})["id"]
-    job = rest(server, f"/projects/{made}/plan", "POST", {})
-    with urllib.request.urlopen(f"{server.url}/api/v1/jobs/{job['id']}/events") as events:
-        events.read()
-    assert rest(server, f"/jobs/{job['id']}")["state"] == "done"
+    made = server.rest("/projects", "POST", {"name": "Plate", "sample": "flat-plate"})["id"]
+    server.worked(f"/projects/{made}/plan", {})
     return made
 
 
@@ -47,14 +43,6 @@ def page(server, chromium):
     page.watch = Watch(server.url).on(page)
     yield page
     context.close()
-
-
-def rest(server, path, method="GET", body=None):
-    sent = None if body is None else json.dumps(body).encode()
-    headers = {"Content-Type": "application/json"}
-    request = urllib.request.Request(f"{server.url}/api/v1{path}", sent, headers, method=method)
-    with urllib.request.urlopen(request) as answer:
-        return json.load(answer)
 
 
 def test_from_the_sample_to_the_corrected_program(server, page):
@@ -70,13 +58,13 @@ def test_from_the_sample_to_the_corrected_program(server, page):
     page.wait_for_timeout(1500)
     box = page.locator("iframe").bounding_box()
     page.mouse.click(box["x"] + box["width"] / 2, box["y"] + box["height"] / 2)
-    until(page, lambda: len(rest(server, f"/projects/{pid}/keypoints")) == 1, what="the key point")
-    [point] = rest(server, f"/projects/{pid}/keypoints")
+    until(page, lambda: len(server.rest(f"/projects/{pid}/keypoints")) == 1, what="the key point")
+    [point] = server.rest(f"/projects/{pid}/keypoints")
     assert abs(point["x_mm"] - 75.0) < 3.0
     assert abs(point["y_mm"] - 50.0) < 3.0
     assert point["z_mm"] == pytest.approx(10.0, abs=1e-3)
     page.get_by_role("button", name="Undo").click()
-    until(page, lambda: rest(server, f"/projects/{pid}/keypoints") == [], what="the undo")
+    until(page, lambda: server.rest(f"/projects/{pid}/keypoints") == [], what="the undo")
 
     journey.suggest(page)
     journey.plan(page)
@@ -88,7 +76,7 @@ def test_from_the_sample_to_the_corrected_program(server, page):
     shown = [t.replace("−", "-").replace("+", "") for t in page.locator("table.correction b").all_inner_texts()]
     truth = [float(v) for v in OFFSET.values()]
     # The page shows what the server found, and that is where the part was hidden.
-    found = rest(server, f"/projects/{pid}/alignments/1")
+    found = server.rest(f"/projects/{pid}/alignments/1")
     assert np.allclose([float(t) for t in shown], [found["correction"][k] for k in SIX], atol=6e-4)
     # In the plate's plane one short scan across the edges is worth what it claims, no more: five of its sigmas.
     sigma = np.array([found["dof"][k]["sigma"] for k in "xyzabc"])
@@ -109,7 +97,7 @@ def test_from_the_sample_to_the_corrected_program(server, page):
     page.get_by_role("button", name="Assess the inspection scan").click(timeout=journey.SLOW)
     page.get_by_role("tab", name="Amplitude").click(timeout=journey.SLOW)
     page.locator(".drawer .heatmaplayer image").first.wait_for(timeout=journey.SLOW)
-    assert rest(server, f"/projects/{pid}/assessments/1")["after"]["within_2db"] > 0.99
+    assert server.rest(f"/projects/{pid}/assessments/1")["after"]["within_2db"] > 0.99
     assert page.watch.complaints == []
     assert page.watch.foreign == []
 
@@ -136,14 +124,14 @@ def test_a_setup_edit_is_checked_saved_and_undone(server, page, pid):
     opened(page, server, pid, "cell")
     field = page.locator("input[name='standoff_mm']")
     field.wait_for()
-    before = rest(server, f"/projects/{pid}/setup")["standoff_mm"]
+    before = server.rest(f"/projects/{pid}/setup")["standoff_mm"]
     field.fill("17.5")
     field.press("Tab")
     page.get_by_role("button", name="Save the cell").click()
     page.get_by_role("button", name="Continue: the surface").wait_for()
-    assert rest(server, f"/projects/{pid}/setup")["standoff_mm"] == 17.5
+    assert server.rest(f"/projects/{pid}/setup")["standoff_mm"] == 17.5
     page.locator(".inspector footer").get_by_role("button", name="Undo").click()
-    until(page, lambda: rest(server, f"/projects/{pid}/setup")["standoff_mm"] == before, what="the undo")
+    until(page, lambda: server.rest(f"/projects/{pid}/setup")["standoff_mm"] == before, what="the undo")
     # Out of bounds: the browser says so and nothing is offered to save.
     page.locator("input[name='standoff_mm']").fill("-3")
     page.locator("input[name='standoff_mm']").press("Tab")
@@ -152,7 +140,7 @@ def test_a_setup_edit_is_checked_saved_and_undone(server, page, pid):
 
 def test_base_is_fitted_to_touched_points_and_saved(server, page, pid):
     opened(page, server, pid, "cell")
-    setup = rest(server, f"/projects/{pid}/setup")
+    setup = server.rest(f"/projects/{pid}/setup")
     truth = Pose(x_mm=1080.0, y_mm=-64.0, z_mm=405.0, a_deg=11.0, b_deg=0.4, c_deg=-0.7)
     T_base_partnom = Pose(**setup["placement"]).transform("base", "partnom")
     cad = np.array([[0.0, 0.0, 10.0], [150.0, 0.0, 10.0], [0.0, 100.0, 10.0]])
@@ -165,15 +153,15 @@ def test_base_is_fitted_to_touched_points_and_saved(server, page, pid):
     page.get_by_role("button", name="Use this BASE").click()
     page.get_by_role("button", name="Save the cell").click()
     page.get_by_role("button", name="Continue: the surface").wait_for()
-    saved = rest(server, f"/projects/{pid}/setup")["base"]
+    saved = server.rest(f"/projects/{pid}/setup")["base"]
     assert np.allclose([saved[k] for k in SIX], truth.xyzabc(), atol=1e-5)
     assert saved["number"] == setup["base"]["number"]
     page.locator(".inspector footer").get_by_role("button", name="Undo").click()
-    until(page, lambda: rest(server, f"/projects/{pid}/setup") == setup, what="the undo")
+    until(page, lambda: server.rest(f"/projects/{pid}/setup") == setup, what="the undo")
 
 
 def test_a_mesh_without_a_unit_is_told_by_its_size(server, page, tmp_path):
-    made = rest(server, "/projects", "POST", {"name": "Own part"})["id"]
+    made = server.rest("/projects", "POST", {"name": "Own part"})["id"]
     opened(page, server, made, "part")
     file = tmp_path / "panel.stl"
     trimesh.creation.box((0.3, 0.2, 0.01)).export(file)
@@ -181,7 +169,7 @@ def test_a_mesh_without_a_unit_is_told_by_its_size(server, page, tmp_path):
     page.locator(".inspector tr", has_text="300.00 × 200.00 × 10.00 mm").locator("input").check(timeout=journey.SLOW)
     page.get_by_role("button", name="Take panel.stl in m").click()
     page.locator(".top .part").wait_for(timeout=journey.SLOW)
-    assert rest(server, f"/projects/{made}/part")["extents_mm"] == pytest.approx([300.0, 200.0, 10.0], abs=1e-3)
+    assert server.rest(f"/projects/{made}/part")["extents_mm"] == pytest.approx([300.0, 200.0, 10.0], abs=1e-3)
 
 
 def test_why_a_job_failed_is_said(server, page, pid):
@@ -211,10 +199,10 @@ def test_two_browsers_see_each_others_key_points(server, page, chromium, pid):
 def test_the_page_goes_on_after_the_server_was_killed(server, page, pid):
     opened(page, server, pid, "keypoints")
     journey.chosen(page)
-    before = rest(server, f"/projects/{pid}/keypoints")
+    before = server.rest(f"/projects/{pid}/keypoints")
     assert len(before) >= 3
     page.get_by_role("button", name="Clear").click()
-    until(page, lambda: rest(server, f"/projects/{pid}/keypoints") == [], what="the edit")
+    until(page, lambda: server.rest(f"/projects/{pid}/keypoints") == [], what="the edit")
     server.kill()
     page.locator(".people.off").wait_for(timeout=journey.SLOW)
     server.restart()
@@ -223,7 +211,7 @@ def test_the_page_goes_on_after_the_server_was_killed(server, page, pid):
     until(page, lambda: picture(page, ".stage").std() > 10, what="the part on screen again")
     # What was edited before can still be undone.
     page.get_by_role("button", name="Undo").click(timeout=journey.SLOW)
-    until(page, lambda: rest(server, f"/projects/{pid}/keypoints") == before, what="the undo")
+    until(page, lambda: server.rest(f"/projects/{pid}/keypoints") == before, what="the undo")
     # The same points again: the plan of before holds.
     journey.step(page, "Paths")
     page.locator(".inspector .verdict", has_text="Both paths keep to the tolerances").wait_for(timeout=journey.SLOW)

@@ -1,8 +1,5 @@
 """Serial parts in the page: the tab appears with the second part, parts are ticked on and off, the report opens."""
 
-import json
-import urllib.request
-
 import pytest
 
 from tests.browser.eyes import Watch
@@ -20,29 +17,13 @@ def server(tmp_path_factory):
     made.stop()
 
 
-def rest(server, path, method="GET", body=None):
-    sent = None if body is None else json.dumps(body).encode()
-    request = urllib.request.Request(
-        f"{server.url}/api/v1{path}", sent, {"Content-Type": "application/json"}, method=method
-    )
-    with urllib.request.urlopen(request) as answer:
-        return json.load(answer)
-
-
-def done(server, path, body):
-    job = rest(server, path, "POST", body)
-    with urllib.request.urlopen(f"{server.url}/api/v1/jobs/{job['id']}/events") as events:
-        events.read()
-    assert rest(server, f"/jobs/{job['id']}")["state"] == "done"
-
-
 def test_parts_are_compared_and_can_be_left_out(server, chromium):
-    pid = rest(server, "/projects", "POST", {"name": "Plates", "sample": "flat-plate"})["id"]
-    done(server, f"/projects/{pid}/plan", {})
+    pid = server.rest("/projects", "POST", {"name": "Plates", "sample": "flat-plate"})["id"]
+    server.worked(f"/projects/{pid}/plan", {})
     for seed, offset in enumerate(OFFSETS):
-        done(server, f"/projects/{pid}/simulate", {"offset": dict(zip(KEYS, offset, strict=True)), "seed": seed})
-        newest = rest(server, f"/projects/{pid}/scans")[-1]["number"]
-        done(server, f"/projects/{pid}/alignments", {"scans": [newest]})
+        server.worked(f"/projects/{pid}/simulate", {"offset": dict(zip(KEYS, offset, strict=True)), "seed": seed})
+        newest = server.rest(f"/projects/{pid}/scans")[-1]["number"]
+        server.worked(f"/projects/{pid}/alignments", {"scans": [newest]})
     context = chromium.new_context(viewport={"width": 1280, "height": 800})
     page = context.new_page()
     watch = Watch(server.url).on(page)
@@ -50,7 +31,7 @@ def test_parts_are_compared_and_can_be_left_out(server, chromium):
     page.get_by_role("tab", name="Batch").click()
     table = page.locator(".drawer .batch table")
     table.wait_for()
-    said = rest(server, f"/projects/{pid}/batch")
+    said = server.rest(f"/projects/{pid}/batch")
     assert table.locator("th").first.inner_text() == "3 parts, BASE"
     common = table.locator("tr", has_text="common").locator("td").all_inner_texts()[1:]
     digits = {"deg": 4, "mm": 3}

@@ -1,8 +1,5 @@
 """Two projects of one part in the page: aligned together by a tick, and whose record is edited."""
 
-import json
-import urllib.request
-
 import pytest
 
 from tests.browser import journey
@@ -19,26 +16,11 @@ def server(tmp_path_factory):
     made.stop()
 
 
-def rest(server, path, method="GET", body=None):
-    sent = None if body is None else json.dumps(body).encode()
-    headers = {"Content-Type": "application/json"}
-    request = urllib.request.Request(f"{server.url}/api/v1{path}", sent, headers, method=method)
-    with urllib.request.urlopen(request) as answer:
-        return json.load(answer)
-
-
-def worked(server, path, body):
-    job = rest(server, path, "POST", body)
-    with urllib.request.urlopen(f"{server.url}/api/v1/jobs/{job['id']}/events") as events:
-        events.read()
-    assert rest(server, f"/jobs/{job['id']}")["state"] == "done"
-
-
 def test_tick_align_and_write_the_record_of_the_result(server, chromium):
-    pids = [rest(server, "/projects", "POST", {"name": n, "sample": "flat-plate"})["id"] for n in ("Face A", "Face B")]
+    pids = [server.rest("/projects", "POST", {"name": n, "sample": "flat-plate"})["id"] for n in ("Face A", "Face B")]
     for pid in pids:
-        worked(server, f"/projects/{pid}/plan", {})
-    worked(server, f"/projects/{pids[0]}/simulate", {"offset": {"x_mm": 0.5, "z_mm": 0.7}, "seed": 3})
+        server.worked(f"/projects/{pid}/plan", {})
+    server.worked(f"/projects/{pids[0]}/simulate", {"offset": {"x_mm": 0.5, "z_mm": 0.7}, "seed": 3})
     context = chromium.new_context(viewport={"width": 1024, "height": 900})
     page = context.new_page()
     page.watch = Watch(server.url).on(page)
@@ -46,7 +28,7 @@ def test_tick_align_and_write_the_record_of_the_result(server, chromium):
     tick = page.locator('input[name^="together-"]')
     page.get_by_text("It has no alignment scan yet.").wait_for(timeout=journey.SLOW)
     assert tick.is_disabled()
-    worked(server, f"/projects/{pids[1]}/simulate", {"offset": {"x_mm": 0.5, "z_mm": 0.7}, "seed": 4})
+    server.worked(f"/projects/{pids[1]}/simulate", {"offset": {"x_mm": 0.5, "z_mm": 0.7}, "seed": 4})
     page.reload()
     page.locator('input[name^="together-"]:not([disabled])').check(timeout=journey.SLOW)
     page.get_by_role("button", name="Align", exact=True).click()
@@ -54,7 +36,7 @@ def test_tick_align_and_write_the_record_of_the_result(server, chromium):
     table.wait_for(timeout=journey.SLOW)
     assert "Face A" in table.inner_text()
     for pid, other in zip(pids, ("Face B", "Face A"), strict=True):
-        (made,) = rest(server, f"/projects/{pid}/alignments")
+        (made,) = server.rest(f"/projects/{pid}/alignments")
         assert made["options"]["together"] == [other]
     page.goto(f"{server.url}/#/p/{pids[0]}/report")
     page.get_by_text("filled in").click(timeout=journey.SLOW)
@@ -64,8 +46,8 @@ def test_tick_align_and_write_the_record_of_the_result(server, chromium):
     page.locator('input[name="record-next"]').uncheck()
     page.get_by_role("button", name="Save the record").click()
     page.locator("button[disabled]", has_text="Save the record").wait_for(timeout=journey.SLOW)
-    assert rest(server, f"/projects/{pids[0]}/alignments/1/record")["part"]["serial"] == "SN-ONE"
-    assert rest(server, f"/projects/{pids[0]}/record")["part"]["serial"] == ""
+    assert server.rest(f"/projects/{pids[0]}/alignments/1/record")["part"]["serial"] == "SN-ONE"
+    assert server.rest(f"/projects/{pids[0]}/record")["part"]["serial"] == ""
     page.locator('select[name="record-of"]').select_option("")
     page.get_by_text("0 of ").wait_for(timeout=journey.SLOW)
     assert page.watch.complaints == []
