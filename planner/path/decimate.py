@@ -53,6 +53,8 @@ def decimate(
         dense, free, bound = (np.bincount(x, minlength=n) for x in (b.block, knots.block, poses.block))
         better = (bound > 0) & ((free > dense) | ((bound <= free) & (_ratio(poses, n) <= max_ratio * (1.0 + 1e-6))))
         knots = knots_at(b, np.sort(np.concatenate([knots.s[~better[knots.block]], poses.s[better[poses.block]]])))
+        # Poses may stand beside each other as no two knots may.
+        knots, _ = _kept(b, knots, limits, on_poses=False)
     return with_knots(path, b, knots)
 
 
@@ -68,7 +70,11 @@ class _Limits:
 
 def _thinned(b: Blocks, limits: _Limits, on_poses: bool) -> tuple[Knots, Ints]:
     """Return knots that keep the limits, and the blocks that did not with the first choice. on_poses: all are poses."""
-    knots = knots_at(b, _first_choice(b, limits, on_poses))
+    return _kept(b, knots_at(b, _first_choice(b, limits, on_poses)), limits, on_poses)
+
+
+def _kept(b: Blocks, knots: Knots, limits: _Limits, on_poses: bool) -> tuple[Knots, Ints]:
+    """Return knots with more of them until they keep the limits, and the blocks that did not at first."""
     rough = np.zeros(0, dtype=np.int64)
     for k in range(_ROUNDS):
         knots = _graded(b, knots, limits, on_poses)

@@ -12,6 +12,7 @@ from scipy.spatial.transform import Rotation, Slerp
 from benchmarks.planning.panels import Panel, panels, tube
 from planner.errors import EchoBaseError
 from planner.path.decimate import decimate, deviation
+from planner.path.passes import DataRuns, assemble
 from planner.path.raster import raster
 from planner.toolpath import Role, ToolPath
 from tests.path.shapes import crystal, curved_of, plate, setup_of
@@ -199,6 +200,51 @@ def test_a_rough_surface_never_takes_more_poses_than_were_acquired() -> None:
         chord, spline = worst(dense, sparse, bc)
         assert (chord <= (0.05, 0.1)).all()
         assert (spline <= (0.05, 0.1)).all()
+
+
+def kinked(seed: int, step_mm: float) -> ToolPath:
+    """One pass over a profile of flats, arcs of R 30 to 800 and up to five kinks of up to 12 deg, poses unevenly spaced at
+    every third seed; beams that waver about the travel at every second."""
+    rng = np.random.default_rng(seed)
+    n = int(rng.integers(40, 200))
+    bend = np.zeros(n)
+    for _ in range(rng.integers(0, 4)):
+        a, length = rng.integers(0, n), rng.integers(5, 60)
+        bend[a : a + length] += step_mm / rng.uniform(30.0, 800.0) * rng.choice([-1, 1])
+    for _ in range(rng.integers(1, 6)):
+        bend[rng.integers(0, n)] += np.radians(rng.uniform(0.05, 12.0)) * rng.choice([-1, 1])
+    step = step_mm * (rng.uniform(0.3, 1.0, n) if seed % 3 == 0 else np.ones(n))
+    at = np.cumsum(bend)
+    points = np.cumsum(np.column_stack([np.cos(at), np.zeros(n), np.sin(at)]) * step[:, None], axis=0)
+    lean = np.concatenate([at[:1], 0.5 * (at[1:] + at[:-1])])
+    travel = np.column_stack([np.cos(lean), np.zeros(n), np.sin(lean)])
+    normals = np.column_stack([-np.sin(lean), np.zeros(n), np.cos(lean)])
+    if seed % 2:
+        waver = np.radians(np.cumsum(rng.normal(0.0, 0.05, n)))
+        normals = Rotation.from_rotvec(travel * waver[:, None]).apply(normals)
+    one = np.ones(1, dtype=np.int8)
+    on = np.zeros(n, dtype=np.int32), np.tile([1.0, 0.0, 0.0], (n, 1)), np.zeros(n, dtype=np.int64)
+    return assemble(DataRuns(points, normals, travel, *on, one), "inspection", 15.0, step_mm)
+
+
+@pytest.mark.parametrize("step_mm", [0.7, 2.0, 5.0])
+def test_kinked_passes_keep_spacing_and_tolerance(step_mm: float) -> None:
+    """Poses beside a kink stand as near to each other as the kink puts them; those sent do not, and are hardly more."""
+    poses = sent = 0
+    for seed in range(40):
+        dense = kinked(seed, step_mm)
+        sparse = decimate(dense)
+        poses, sent = poses + len(dense), sent + len(sparse)
+        ((xyz, _, _),) = blocks(sparse)
+        d = np.linalg.norm(np.diff(xyz, axis=0), axis=1)
+        assert d.max() <= 15.0 + 1e-6
+        assert np.maximum(d[1:] / d[:-1], d[:-1] / d[1:]).max() <= 2.0 + 1e-6
+        if step_mm > 1.0:
+            # Where the TCP backs at an inner kink, its nearest place on the motion is not its place in time.
+            chord, spline = worst(dense, sparse, "natural")
+            assert (chord <= (0.05, 0.1)).all()
+            assert (spline <= (0.05, 0.1)).all()
+    assert sent < poses
 
 
 def test_nonsense_tolerances_are_refused() -> None:
