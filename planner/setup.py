@@ -273,6 +273,8 @@ class Setup(Strict):
     robot_root: Pose = Pose()
     """T_world_robroot."""
     controller: Literal["krc2", "krc4", "krc5"] = "krc4"
+    program_name: str | None = Field(None, pattern=r"^[A-Z][A-Z0-9_]{0,12}$")
+    """What the KRL programs are called, before `_AL` and `_IN`; null: from the part and the surface inspected."""
     fixture: Fixture = Fixture()
     tolerances: Tolerances = Tolerances()
     alignment: Alignment = Alignment()

@@ -164,7 +164,7 @@ def _corrected_program(plan: Plan, followed: Followed, content: dict[str, Any]) 
             plan,
             followed.sent,
             followed.dense,
-            program_name(plan.part, "corrected"),
+            program_name(plan, "corrected"),
             T_base_basecorr=found.T_base_basecorr,
             notes=notes,
             verdict=found.verdict,

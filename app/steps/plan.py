@@ -129,7 +129,7 @@ def _checked_program(plan: Plan, path: ToolPath) -> tuple[list[Issue], Artifacts
     if errors_in(issues):
         return issues, {}, record
     try:
-        exported = export_path(plan, sent, path, program_name(plan.part, path.kind))
+        exported = export_path(plan, sent, path, program_name(plan, path.kind))
     except EchoBaseError as error:
         return issues + list(error.issues), {}, record
     record["program"] = exported.manifest

@@ -1,7 +1,6 @@
 """Programs of a plan: their names, their export, and reading them back from a folder."""
 
 import json
-import re
 from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path, PurePosixPath
@@ -11,13 +10,13 @@ from app.plan import Artifacts, Plan
 from kuka_export.check import check_files
 from kuka_export.dense import dense_csv
 from kuka_export.export import export
+from kuka_export.names import program_stem
 from kuka_export.options import DEFAULT_OPTIONS, ProgramOptions
 from kuka_export.reader import KrlReading, read_program
 from kuka_export.runsheet import run_sheet_html, run_sheet_text
 from planner.errors import fail
 from planner.frames import Transform
 from planner.issues import Issue
-from planner.part import Part
 from planner.setup import Setup
 from planner.toolpath import ToolPath
 
@@ -33,10 +32,19 @@ class ExportedProgram:
     issues: tuple[Issue, ...]
 
 
-def program_name(part: Part, kind: str) -> str:
-    """Return the stem of a program's modules: short, legal, and different for different parts."""
-    stem = re.sub(r"[^A-Z0-9]", "", Path(part.provenance.name).stem.upper())[:8] or "PART"
-    return f"EB_{stem}_{ {'alignment': 'AL', 'inspection': 'IN', 'corrected': 'IN'}[kind] }"
+def program_name(plan: Plan, kind: str) -> str:
+    """Return the stem of a program's modules: of the setup, or different for different parts and surfaces.
+
+    The corrected program keeps the name that the inspection of the plan was written under, for it calls the same modules.
+    """
+    if kind == "corrected":
+        written = (plan.summary.get("inspection") or {}).get("program") or {}
+        if isinstance(written.get("program"), str):
+            return str(written["program"])
+    ending = {"alignment": "AL", "inspection": "IN", "corrected": "IN"}[kind]
+    surface, origin = plan.surface, plan.part.provenance
+    place = " ".join(f"{v:.2f}" for v in (surface.area_mm2, *surface.centroid_part))
+    return program_stem(Path(origin.name).stem, ending, f"{origin.sha256} {place}", plan.setup.program_name)
 
 
 def export_path(

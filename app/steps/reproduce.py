@@ -189,7 +189,7 @@ def _after_following(cell: _Cell, truth: Truth, seed: int) -> tuple[float, float
     if T is None or followed.found.failed:
         raise EchoBaseError(*errors_in(followed.found.issues))
     options = ProgramOptions(adapted=followed.adapted)
-    name = program_name(plan.part, "corrected")
+    name = program_name(plan, "corrected")
     program = export_path(plan, followed.sent, followed.dense, name, T_base_basecorr=T, options=options)
     return _spread(cell, cell.scan("corrected", truth, seed + 500, T, program.files), truth)
 

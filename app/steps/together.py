@@ -61,15 +61,12 @@ def run_align_together(items: Sequence[PlanScans], progress: Progress) -> list[A
 
 def _same_names(k: int, items: Sequence[PlanScans], given: Sequence[Prepared]) -> list[Issue]:
     """Return a warning where another plan's programs are called as those of plan k: one would replace the other."""
-    names = [program_name(g.plan.part, "corrected") for g in given]
+    names = [program_name(g.plan, "corrected") for g in given]
     alike = [f"'{item.name}'" for n, item in enumerate(items) if n != k and names[n] == names[k]]
     if not alike:
         return []
     text = f"the programs of {' and '.join(alike)} are called {names[k]} too: on the controller one replaces the other."
-    remedy = (
-        "Load one inspection after the other; or plan from copies of the CAD file with names of their own, which name the "
-        "programs."
-    )
+    remedy = "Load one inspection after the other; or plan one of them with another program_name in its setup."
     return [Issue("warning", "programs-alike", text, remedy, "corrected")]
 
 
