@@ -96,7 +96,7 @@ def _base_rows(program: KrlProgram, setup: Setup) -> list[tuple[str, str]]:
 def _axes(program: KrlProgram, main: str) -> str:
     for s in _flat(program.module(main).body):
         if isinstance(s, AxisMove):
-            return "  ".join(f"A{k} {v:.2f}" for k, v in enumerate(s.axes_deg, 1)) + " deg"
+            return "  ".join(f"A{k} {v:z.2f}" for k, v in enumerate(s.axes_deg, 1)) + " deg"
     return "none: starts at XHOME"
 
 

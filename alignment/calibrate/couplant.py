@@ -4,7 +4,7 @@ import numpy as np
 from scipy.optimize import brentq
 
 from alignment.calibrate.result import Calibration, Estimate, Status, factor_95
-from planner.couplant import water_speed_m_s
+from planner.couplant import sound_speed_m_s, water_speed_m_s
 from planner.errors import fail
 from planner.frames import Array
 from planner.issues import Issue
@@ -16,6 +16,8 @@ TOF_SIGMA_US = 0.0135
 SPEED_MEASURED, SPEED_WEAK = 1e-3, 1e-2
 DELAY_MEASURED_US, DELAY_WEAK_US = 0.02, 0.2
 PLAUSIBLE_M_S = (300.0, 7000.0)
+# Half or twice the speed of the setup, to this share, is a mistake in the file and no couplant.
+FACTOR_SHARE = 0.06
 
 
 def calibrate_couplant(
@@ -37,7 +39,8 @@ def calibrate_couplant(
     if (gap_mm is None) == (step_mm is None):
         raise fail("couplant-readings", "State either gap_mm or step_mm.", "One column of distances is needed.")
     distance = np.asarray(gap_mm if gap_mm is not None else step_mm, dtype=np.float64)
-    good = np.isfinite(tof) & np.isfinite(distance) & np.isfinite(number) & (number >= 1.0)
+    _refuse_odd(number)
+    good = np.isfinite(tof) & np.isfinite(distance) & np.isfinite(number)
     tof, number, distance = tof[good], number[good], distance[good]
     recorded = tof
     if len(tof) == 0:
@@ -72,6 +75,7 @@ def calibrate_couplant(
             f"The readings ask for a speed of sound of {speed:.0f} m/s, which no couplant has.",
             "Check units (mm, us, two-way) and the echo numbers.",
         )
+    _refuse_factor(speed, sound_speed_m_s(couplant))
     factor = factor_95(dof) if dof > 0 else 1.96
     sigma = float(speed * np.sqrt(covariance[0, 0]) / solution[0])
     status = _status(sigma / speed, SPEED_MEASURED, SPEED_WEAK)
@@ -88,7 +92,7 @@ def calibrate_couplant(
     rms = float(np.sqrt(np.mean(off**2)))
     moved = "gap_mm" if gap_mm is not None else "step_mm"
     curves = {moved: distance, "echo": number, "expected_us": recorded - off, "residual_us": off}
-    issues = tuple(_say(estimates, float(speed), known_delay))
+    issues = tuple(_say(estimates, float(speed), known_delay, moved))
     return Calibration("couplant", estimates, {"couplant": patch} if patch else {}, len(tof), rms, "us", issues, curves)
 
 
@@ -102,15 +106,43 @@ def _status(error: float, measured: float, weak: float) -> Status:
     return "measured" if error <= measured else "weak" if error <= weak else "held"
 
 
-def _say(estimates: dict[str, Estimate], speed: float, known_delay: bool) -> list[Issue]:
+def _refuse_odd(number: Array) -> None:
+    odd = np.isfinite(number) & ((number < 1.0) | (number != np.rint(number)))
+    if odd.any():
+        row = int(np.argmax(odd))
+        raise fail(
+            "couplant-readings",
+            f"Column echo, reading {row + 1}: {number[row]:g} is no number of an echo.",
+            "Number the echoes 1 (the first), 2, 3 and so on.",
+        )
+
+
+def _refuse_factor(speed: float, believed: float) -> None:
+    for factor, word, cause in (
+        (0.5, "half", "the readings are second echoes, or echoes are numbered one too low"),
+        (2.0, "twice", "the times are one-way, or echoes are numbered one too high"),
+    ):
+        if abs(speed / (factor * believed) - 1.0) < FACTOR_SHARE:
+            raise fail(
+                "couplant-readings",
+                f"The readings ask for {speed:.0f} m/s, {word} the {believed:.0f} m/s of the setup: probably {cause}.",
+                "Give two-way times and number the echoes from 1; if the couplant really has this speed, state "
+                "couplant.sound_speed_m_s first.",
+            )
+
+
+def _say(estimates: dict[str, Estimate], speed: float, known_delay: bool, moved: str) -> list[Issue]:
     issues = []
     if known_delay:
+        remedy = "Add a second gap, or a repeat echo."
+        if moved == "step_mm":
+            remedy = "Add a repeat echo, or state the gaps themselves (gap_mm)."
         issues.append(
             Issue(
                 "info",
                 "couplant-delay-held",
                 "The delay stays as it was: these readings cannot tell it from the distance.",
-                "Add a second gap, or a repeat echo.",
+                remedy,
             )
         )
     for name, estimate in estimates.items():

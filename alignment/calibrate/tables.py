@@ -3,12 +3,11 @@
 from pathlib import Path
 
 import numpy as np
-import polars as pl
 
+from alignment.readers.columns import Layout
+from alignment.readers.delimited import read_columns
 from planner.errors import fail
 from planner.frames import Array
-
-MAX_ROWS = 5_000_000
 
 
 def read_table(
@@ -17,38 +16,26 @@ def read_table(
     """Return the named columns of a CSV file as float64 (n,); absent optional ones are left out, empty cells are NaN.
 
     name: what people call the file; default: its own name.
-    Raises EchoBaseError `calibration-file` naming the column or the file.
+    Raises EchoBaseError: `calibration-file` naming the column that is missing, or as the reader of scans does.
     """
     shown = path.name if name is None else name
-    try:
-        table = pl.read_csv(path, infer_schema_length=None, comment_prefix="#", n_rows=MAX_ROWS)
-    except (pl.exceptions.PolarsError, OSError, ValueError) as error:
-        raise fail(
-            "calibration-file",
-            "The file cannot be read as CSV.",
-            "Save it as CSV in UTF-8 with a header, commas between columns and points in numbers.",
-            shown,
-        ) from error
-    names = {column.strip().lower(): column for column in table.columns}
-    missing = [column for column in required if column not in names]
-    if missing:
-        raise fail(
-            "calibration-file",
-            f"The column {', '.join(missing)} is missing.",
-            f"The file needs the columns {', '.join(required)}"
-            + (f"; it may have {', '.join(optional)}." if optional else "."),
-            shown,
-        )
-    columns = {}
-    for column in (*required, *optional):
-        if column not in names:
-            continue
-        try:
-            columns[column] = np.asarray(table[names[column]].cast(pl.Float64).fill_null(float("nan")).to_numpy())
-        except pl.exceptions.PolarsError as error:
+
+    def choose(present: list[str], _: str) -> Layout:
+        names = {column.strip().lower(): column for column in present}
+        missing = [column for column in required if column not in names]
+        if missing:
+            column_s = f"the column {missing[0]} is" if len(missing) == 1 else f"the columns {', '.join(missing)} are"
             raise fail(
-                "calibration-file", f"Column {column} holds something that is no number.", "Correct it.", shown
-            ) from error
-    if table.height == 0:
-        raise fail("calibration-file", "The file has no rows.", "Record the readings again.", shown)
+                "calibration-file",
+                f"{column_s} missing; the file has {', '.join(names)}.",
+                f"The file needs the columns {', '.join(required)}"
+                + (f"; it may have {', '.join(optional)}." if optional else "."),
+                shown,
+            )
+        return Layout("readings", {key: names[key] for key in (*required, *optional) if key in names}, ())
+
+    table = read_columns(path, shown, choose)[1]
+    columns = {key: np.asarray(values.to_numpy(), dtype=np.float64) for key, values in table.items()}
+    if len(columns[required[0]]) == 0:
+        raise fail("calibration-file", "the file has a header but no readings.", "Record the readings again.", shown)
     return columns

@@ -15,6 +15,10 @@ MIN_SPAN_DEG = 0.5
 # Relative one-sigma error up to which a curvature counts as measured, and as weak.
 MEASURED_SHARE, WEAK_SHARE = 0.1, 0.5
 MIN_ANGLES = 6
+# The full screen height: a top amplitude from here on that so many angles share exactly is where the receiver clips.
+FULL_PCT, CLIPPED_ANGLES = 99.0, 3
+# An echo that grows with tilt by more than so many standard deviations is no noise.
+GROWS_SIGMAS = 3.0
 OUTLIER_SIGMAS = 4.0
 
 
@@ -24,13 +28,22 @@ def calibrate_tilt(
     """Return k_b and k_c (dB/deg^2) and the zero of both angles from n readings (n,) each.
 
     Model: 20 log10 A = a - k_b (b - b0)^2 - k_c (c - c0)^2, linear in a, k b0, k. Readings at the same angles are averaged
-    first, since they share the angle's own error; readings at or above `saturation_pct` and more than 15 dB below the best
-    are left out. Raises EchoBaseError `tilt-readings` when too few angles remain.
+    first, since they share the angle's own error; readings at or above `saturation_pct` (None: where the receiver is seen to
+    clip) and more than 15 dB below the best are left out. Raises EchoBaseError `tilt-readings` when too few angles remain,
+    or amplitudes are negative.
     """
     b, c, amplitude = (np.asarray(v, dtype=np.float64) for v in (b_deg, c_deg, amplitude_pct))
+    if (amplitude < 0.0).any():
+        row = int(np.argmax(amplitude < 0.0))
+        raise fail(
+            "tilt-readings",
+            f"amplitude_pct of reading {row + 1} is {amplitude[row]:g}, below 0.",
+            "Give amplitudes in % of full screen height; leave the cell empty where there was no echo.",
+        )
     good = np.isfinite(b) & np.isfinite(c) & np.isfinite(amplitude) & (amplitude > 0.0)
-    if saturation_pct is not None:
-        good &= amplitude < saturation_pct
+    clipped = amplitude >= (_clips_at(b, c, amplitude) if saturation_pct is None else saturation_pct)
+    said = [_clipped(amplitude[good & clipped])] if (good & clipped).any() else []
+    good &= ~clipped
     b, c, level = _by_angle(b[good], c[good], 20.0 * np.log10(amplitude[good]))
     keep = level > level.max(initial=-np.inf) - MAX_DROP_DB
     spans = {"b": _span(b[keep]) >= MIN_SPAN_DEG, "c": _span(c[keep]) >= MIN_SPAN_DEG}
@@ -38,7 +51,14 @@ def calibrate_tilt(
     for axis, angle in (("b", b), ("c", c)):
         if spans[axis]:
             terms |= {f"p{axis}": angle, f"k{axis}": -(angle**2)}
-    if keep.sum() < max(MIN_ANGLES, len(terms) + 1) or not any(spans.values()):
+    if keep.sum() >= MIN_ANGLES and not any(spans.values()):
+        raise fail(
+            "tilt-readings",
+            f"The angles with an echo span {_span(b[keep]):.2g} deg in B and {_span(c[keep]):.2g} deg in C: too little for a "
+            "tilt curve.",
+            "Turn the probe through at least +-2 deg, and give b_deg and c_deg in degrees.",
+        )
+    if keep.sum() < max(MIN_ANGLES, len(terms) + 1):
         raise fail(
             "tilt-readings",
             f"{int(keep.sum())} different angles with an echo are too few for a tilt curve.",
@@ -46,7 +66,7 @@ def calibrate_tilt(
         )
     solution, covariance, dof, keep, rms = _fit(np.column_stack(list(terms.values())), level, keep)
     at = {name: i for i, name in enumerate(terms)}
-    estimates, patch, issues = {}, {}, []
+    estimates, patch, issues = {}, {}, said
     for axis in ("b", "c"):
         estimate, issue = _curvature(axis, spans[axis], at, solution, covariance, dof)
         estimates[f"k_{axis}"] = estimate
@@ -63,6 +83,21 @@ def calibrate_tilt(
 
 def _span(angle: Array) -> float:
     return float(np.ptp(angle)) if len(angle) else 0.0
+
+
+def _clips_at(b: Array, c: Array, amplitude: Array) -> float:
+    """Return the amplitude from which on the receiver clips, infinite if it does not."""
+    top = float(np.max(amplitude, where=np.isfinite(amplitude), initial=0.0))
+    at_top = np.column_stack([b, c])[amplitude == top]
+    clips = top >= FULL_PCT and len(np.unique(at_top, axis=0)) >= CLIPPED_ANGLES
+    return top if clips else np.inf
+
+
+def _clipped(amplitude: Array) -> Issue:
+    text = f"{len(amplitude)} readings of {amplitude.min():g} %FSH and more, where the receiver clips, were left out."
+    return Issue(
+        "warning", "tilt-clipped", text, "Lower the gain until the largest echo stays below 90 %, and record again."
+    )
 
 
 def _by_angle(b: Array, c: Array, level: Array) -> tuple[Array, Array, Array]:
@@ -105,6 +140,9 @@ def _curvature(
     estimate = Estimate(k, sigma, sigma * factor_95(dof), unit, status)
     if status == "measured":
         return estimate, None
+    if k < -GROWS_SIGMAS * sigma:
+        text = f"The echo grows with the tilt in {axis.upper()}, by {-k:.2g} {unit}; the tilt loss stays as it was."
+        return estimate, Issue("warning", "tilt-held", text, "Check the columns, and that the target is flat.", axis)
     what = "is not seen in these readings" if status == "held" else f"is known to {100 * sigma / k:.0f} % only"
     return estimate, Issue(
         "warning",

@@ -2,6 +2,7 @@
 
 import csv
 import gzip
+from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
@@ -17,13 +18,23 @@ CUT_REMEDY = "The file seems cut short: export or copy it again whole."
 
 def parse_csv(source: Path, name: str) -> dict[str, Any]:
     """Return the payload (see `tables.payload`) of a comma-separated file with a header line."""
+    return payload(*read_columns(source, name, layout), name)
+
+
+def read_columns(
+    source: Path, name: str, choose: Callable[[list[str], str], Layout]
+) -> tuple[Layout, dict[str, pl.Series]]:
+    """Return the columns that `choose` (of the names in the header, and the file's) takes, float64, empty cells null.
+
+    Raises EchoBaseError with line and column of what is no number, or not there because the file was cut.
+    """
     header_line, skip = _header(source, name)
     columns = next(csv.reader([header_line]))
-    found = layout([column for column in columns if column.strip()], name)
+    found = choose([column for column in columns if column.strip()], name)
     table = _columns(source, name, columns, found, skip)
     if any(column.len() and column[-1] is None for column in table.values()):
         _refuse_cut(source, name, columns)
-    return payload(found, table, name)
+    return found, table
 
 
 def _header(source: Path, name: str) -> tuple[str, int]:

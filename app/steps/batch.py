@@ -140,12 +140,15 @@ def _correction(path: Path, name: str) -> BatchItem:
         inner = path / "correction"
         path = (inner if (inner / CORRECTION).is_file() else path) / CORRECTION
     try:
-        text = path.read_bytes()
-        content = json.loads(text)
+        raw = path.read_bytes()
+        content = json.loads(raw)
         if not isinstance(content, dict):
-            raise ValueError("no object")
-    except (OSError, ValueError) as error:
+            raise ValueError("no JSON object")
+    except OSError as error:
         raise fail("batch-correction", "There is no correction.json to read.", "Align first.", str(path)) from error
+    except ValueError as error:
+        text = f"The file is no correction.json: it is damaged or cut short ({error})."
+        raise fail("batch-correction", text, "Copy it again, or align again.", str(path)) from error
     field, report = path.parent / FIELD, path.parent / "report.json"
     simulated = False
     if report.is_file():

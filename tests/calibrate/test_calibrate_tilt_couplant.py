@@ -165,8 +165,8 @@ def test_files_of_readings(tmp_path) -> None:
     "text, message",
     [
         ("b_deg,c_deg\n1,2\n", "amplitude_pct is missing"),
-        ("b_deg,c_deg,amplitude_pct\n", "no rows"),
-        ("", "cannot be read"),
+        ("b_deg,c_deg,amplitude_pct\n", "no readings"),
+        ("", "file is empty"),
     ],
 )
 def test_wrong_files_name_what_is_wrong(tmp_path, text: str, message: str) -> None:
@@ -176,5 +176,57 @@ def test_wrong_files_name_what_is_wrong(tmp_path, text: str, message: str) -> No
         calibrate("tilt", [path], Setup())
     assert error.value.issues[0].where == "tilt.csv"
     path.write_text("b_deg,c_deg,amplitude_pct\n1,2,loud\n")
-    with pytest.raises(EchoBaseError, match="no number"):
+    with pytest.raises(EchoBaseError, match="row 2, column 'amplitude_pct': 'loud'"):
         calibrate("tilt", [path], Setup())
+
+
+def test_a_table_cut_short_and_one_with_semicolons_are_named(tmp_path) -> None:
+    path = tmp_path / "tilt.csv"
+    for text, code in (
+        ("b_deg,c_deg,amplitude_pct\n0,0,50\n1,0.", "csv-cut"),
+        ("b_deg;c_deg;amplitude_pct\n0;0;50\n", "csv-separator"),
+    ):
+        path.write_text(text)
+        with pytest.raises(EchoBaseError) as error:
+            calibrate("tilt", [path], Setup())
+        assert error.value.issues[0].code == code
+
+
+def tilted(k_b=2.0, k_c=1.0, top=60.0):
+    angle = np.linspace(-3.0, 3.0, 31)
+    b, c = np.r_[angle, 0.0 * angle], np.r_[0.0 * angle, angle]
+    return b, c, top * 10.0 ** (-(k_b * b**2 + k_c * c**2) / 20.0)
+
+
+def test_a_receiver_that_clips_does_not_flatten_the_curve() -> None:
+    b, c, amplitude = tilted(top=170.0)
+    found = calibrate_tilt(b, c, np.minimum(amplitude, 100.0))
+    assert found.estimates["k_b"].value == pytest.approx(2.0, abs=1e-3)
+    assert found.estimates["k_c"].value == pytest.approx(1.0, abs=1e-3)
+    assert [(i.severity, i.code) for i in found.issues] == [("warning", "tilt-clipped")]
+
+
+def test_echoes_that_grow_with_tilt_and_angles_in_radians_are_named() -> None:
+    b, c, amplitude = tilted(k_b=-0.3)
+    found = calibrate_tilt(b, c, amplitude)
+    assert found.estimates["k_b"].status == "held"
+    assert "b" not in found.patch["probe"]["tilt_loss_db_per_deg2"]
+    assert "grows" in found.issues[0].message
+    b, c, amplitude = tilted()
+    with pytest.raises(EchoBaseError, match="in degrees"):
+        calibrate_tilt(np.radians(b), np.radians(c), amplitude)
+    with pytest.raises(EchoBaseError, match="below 0"):
+        calibrate_tilt(b, c, -amplitude)
+
+
+@pytest.mark.parametrize(("factor", "word"), [(0.5, "one-way"), (2.0, "second echoes")])
+def test_half_and_twice_the_speed_are_mistakes(factor, word) -> None:
+    gap = np.arange(5.0, 40.0, 5.0)
+    with pytest.raises(EchoBaseError, match=word):
+        calibrate_couplant(factor * 2e3 * gap / 1482.0, Couplant(), gap_mm=gap)
+
+
+def test_echo_numbers_are_whole() -> None:
+    gap = np.arange(5.0, 40.0, 5.0)
+    with pytest.raises(EchoBaseError, match=r"reading 1: 1\.5"):
+        calibrate_couplant(2e3 * gap / 1482.0, Couplant(), gap_mm=gap, echo=np.full(7, 1.5))

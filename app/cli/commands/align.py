@@ -69,7 +69,17 @@ def _names(folders: list[Path]) -> list[str]:
 
 def pose_line(pose: dict[str, float]) -> str:
     """Return a pose as `X 1.000 Y ... C 0.5000`."""
-    return "  ".join(f"{name} {pose[key]:9.{digits}f}" for key, name, digits in CELLS)
+    return "  ".join(f"{name} {pose[key]:z9.{digits}f}" for key, name, digits in CELLS)
+
+
+def base_line(content: dict[str, Any]) -> str:
+    """Return the corrected BASE; of an untaught one what the program does, since numbers from zero mean nothing there."""
+    base = content["base"]
+    if all(base[key] == content["correction"][key] for key, _, _ in CELLS):
+        text = "as taught on the controller; the program composes the correction onto it"
+    else:
+        text = pose_line(base)
+    return f"BASE[{base['number']}]    {text}"
 
 
 def say_correction(args: argparse.Namespace, content: dict[str, Any]) -> None:
@@ -82,7 +92,7 @@ def say_correction(args: argparse.Namespace, content: dict[str, Any]) -> None:
         args,
         "           " + "  ".join(f"{k.upper()} {d['status']} {d['sigma']:.3g}" for k, d in content["dof"].items()),
     )
-    say(args, f"BASE[{content['base']['number']}]    {pose_line(content['base'])}")
+    say(args, base_line(content))
     say(args, f"residual   {content['residual']['rms_mm']:.3f} mm rms, {content['residual']['readings']} readings")
     for surface in content["surfaces"] or ():
         if surface["readings"]:

@@ -23,10 +23,10 @@ def run(args: argparse.Namespace) -> tuple[dict[str, Any], int]:
     say(args, f"{len(content['parts'])} parts, axes of {content['frame']}")
     for d in content["directions"]:
         scatter = "scatter cannot be told" if d["scatter"] is None else _scatter(d)
-        say(args, f"{d['name']:<10} common {d['mean']:+.4g} +- {d['half_95']:.3g} {d['unit']} (95 %), {scatter}")
+        say(args, f"{d['name']:<10} common {d['mean']:+z.4g} +- {d['half_95']:.3g} {d['unit']} (95 %), {scatter}")
     for part in content["parts"]:
         own = (
-            f"{k} {v['departure']:+.3g} (z {v['z']:+.1f})" for k, v in part["directions"].items() if v["z"] is not None
+            f"{k} {v['departure']:+z.3g} ({v['z']:+z.1f} sd)" for k, v in part["directions"].items() if v["z"] is not None
         )
         say(args, f"{part['name']:<20} " + "  ".join(own))
     shape = content["shape"]

@@ -42,7 +42,7 @@ def run(args: argparse.Namespace) -> tuple[dict[str, Any], int]:
         for number, pose in content[kind].items():
             say(args, f"{kind[:-1]} {number:<3}{pose_line(pose)}")
     if content["home_deg"] is not None:
-        say(args, "HOME    " + "  ".join(f"A{i} {v:.3f}" for i, v in enumerate(content["home_deg"], 1)))
+        say(args, "HOME    " + "  ".join(f"A{i} {v:z.3f}" for i, v in enumerate(content["home_deg"], 1)))
     for note in found.notes:
         say(args, f"note: {note}")
     return content, DONE
