@@ -6,7 +6,10 @@ from collections.abc import Mapping
 from urllib.parse import quote
 
 from fastapi import Response
+from fastapi.responses import StreamingResponse
 
+from app.store.blobs import BlobStore
+from app.store.content import chunks
 from app.store.names import safe_member
 
 
@@ -20,6 +23,12 @@ def attachment(content: bytes, name: str, media: str) -> Response:
     return Response(
         content, media_type=media, headers={"Content-Disposition": disposition(name), "Cache-Control": "no-store"}
     )
+
+
+def streamed(blobs: BlobStore, name: str, sha256: str, size: int) -> StreamingResponse:
+    """Return a stored file as a download, piece by piece."""
+    headers = {"Content-Disposition": disposition(name), "Content-Length": str(size), "Cache-Control": "no-store"}
+    return StreamingResponse(chunks(blobs, sha256), media_type="application/octet-stream", headers=headers)
 
 
 def zipped(files: Mapping[str, bytes]) -> bytes:

@@ -15,7 +15,10 @@ from planner.keypoint import KeyPoint, KeyPointList
 from planner.setup import Setup
 
 router = APIRouter(prefix="/projects/{project_id}", tags=["inputs"])
-Version = Annotated[int | None, Query(ge=1, description="An earlier version instead of the one in force.")]
+Version = Annotated[
+    int | None,
+    Query(ge=0, description="An earlier version instead of the one in force; 0: as it was before anybody gave one."),
+]
 MAX_KEYPOINTS = 10_000
 
 
@@ -98,7 +101,7 @@ def _read(ctx: Context, project_id: str, kind: str, response: Response, version:
         projects.get(session, project_id)
         row = (
             inputs.version_of(session, project_id, kind, version)
-            if version
+            if version is not None
             else inputs.current(session, project_id, kind)
         )
     tag(response, row.version)

@@ -1,4 +1,4 @@
-"""Routes of reports: of an alignment or an assessment, as HTML, PDF, JSON or CSV, with what is known by now."""
+"""Routes of reports: of an alignment, an assessment or a calibration, as HTML, PDF, JSON or CSV, with what is known by now."""
 
 from typing import Annotated, Any, Literal
 
@@ -18,13 +18,16 @@ from app.store.content import get_bytes
 from app.store.freshness import changed_since, in_words
 from app.store.inputs import files_of
 from app.store.refusal import not_found
-from app.store.result_records import edit, record_in, record_of
+from app.store.result_records import OF, edit, record_in, record_of
 from app.store.tables import FileRow, ResultRow
 
 router = APIRouter(prefix="/projects/{project_id}", tags=["results"])
-Kind = Literal["alignment", "assessment"]
+Kind = Literal["alignment", "assessment", "calibration"]
+Recorded = Literal["alignment", "assessment"]
 Format = Literal["html", "pdf", "json", "csv"]
-FOLDER = {"alignment": "correction", "assessment": "assessment"}
+FOLDER = {"alignment": "correction", "assessment": "assessment", "calibration": "calibration"}
+# Programs and readings have addresses of their own.
+NO_DOCUMENTS = ("corrected/", "readings/")
 MEDIA = {
     "html": "text/html; charset=utf-8",
     "pdf": "application/pdf",
@@ -46,7 +49,7 @@ def get_report(
     format: Annotated[Format, Query(description="HTML is one file without scripts.")] = "html",
     download: Annotated[bool, Query(description="As an attachment.")] = False,
 ) -> Response:
-    """Return the report of an alignment or assessment, with its own record and who accepted the result."""
+    """Return the report of a result; of an alignment or assessment with its own record and who accepted it."""
     with ctx.store.db.read() as session:
         project = projects.get(session, project_id)
         row = results.get_result(session, project_id, kind, number)
@@ -79,20 +82,20 @@ def get_figure(ctx: Ctx, project_id: ProjectId, kind: Kind, number: Number, name
 
 @router.get("/{kind}s/{number}/files", responses=documented(404) | ZIP, response_class=Response)
 def get_files(ctx: Ctx, project_id: ProjectId, kind: Kind, number: Number) -> Response:
-    """Download the documents of a result as ZIP: reports, JSON, tables, maps. Programs have their own address."""
+    """Download the documents of a result as ZIP: reports, JSON, tables, maps. Programs and readings have their own address."""
     with ctx.store.db.read() as session:
         project = projects.get(session, project_id)
         row = results.get_result(session, project_id, kind, number)
         rows = files_of(session, project_id, f"{kind}:{number}")
         report = _report(ctx, session, row, rows)
-    documents = {n: get_bytes(ctx.store.blobs, f.sha256) for n, f in rows.items() if not n.startswith("corrected/")}
+    documents = {n: get_bytes(ctx.store.blobs, f.sha256) for n, f in rows.items() if not n.startswith(NO_DOCUMENTS)}
     if report is not None:
         documents |= report.files(FOLDER[kind])
     return attachment(zipped(documents), f"{project.name} {kind} {number}.zip", "application/zip")
 
 
 @router.get("/{kind}s/{number}/record", responses=documented(404))
-def get_record(ctx: Ctx, project_id: ProjectId, kind: Kind, number: Number, response: Response) -> Record:
+def get_record(ctx: Ctx, project_id: ProjectId, kind: Recorded, number: Number, response: Response) -> Record:
     """Return the record of a result: as the project's was when it was made, or as last edited for it."""
     with ctx.store.db.read() as session:
         projects.get(session, project_id)
@@ -105,7 +108,7 @@ def get_record(ctx: Ctx, project_id: ProjectId, kind: Kind, number: Number, resp
 def put_record(
     ctx: Ctx,
     project_id: ProjectId,
-    kind: Kind,
+    kind: Recorded,
     number: Number,
     body: Record,
     response: Response,
@@ -136,6 +139,9 @@ def _report(ctx: Context, session: Session, row: ResultRow, files: dict[str, Fil
     }
     accepted = Acceptance.model_validate(row.accepted) if row.accepted else None
     made = stored(get_bytes(ctx.store.blobs, document.sha256), drawn)
+    if row.kind not in OF:
+        # A calibration says what these readings show; the cell that it was computed with is part of it.
+        return made.completed(None, None, row.created)
     return made.completed(record_in(session, row), accepted, row.created, _outdated(session, row))
 
 

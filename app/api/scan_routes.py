@@ -7,14 +7,13 @@ from fastapi import APIRouter, Query, Request, Response, status
 from fastapi.responses import StreamingResponse
 
 from app.api.context import Ctx, Number, ProjectId
-from app.api.downloads import disposition
+from app.api.downloads import streamed
 from app.api.errors import documented
 from app.api.models import Scan
 from app.api.receive import Received, receive
 from app.api.upload_body import choice, files, upload_body
 from app.store import inputs, projects, scans
 from app.store.blobs import Blob
-from app.store.content import chunks
 from app.store.refusal import not_found, refuse
 from app.store.results import correction_in_force
 from app.store.store import Store
@@ -86,10 +85,7 @@ def download_scan(ctx: Ctx, project_id: ProjectId, number: Number, place: int) -
     if not 0 <= place < len(files):
         raise not_found("file", place)
     name, row = files[place]
-    headers = {"Content-Disposition": disposition(name), "Content-Length": str(row.size), "Cache-Control": "no-store"}
-    return StreamingResponse(
-        chunks(ctx.store.blobs, row.sha256), media_type="application/octet-stream", headers=headers
-    )
+    return streamed(ctx.store.blobs, name, row.sha256, row.size)
 
 
 @router.delete("/{number}", status_code=status.HTTP_204_NO_CONTENT, responses=documented(404))

@@ -1,6 +1,8 @@
 """A calibration with its report: what the command and the page call."""
 
+import base64
 import hashlib
+import json
 from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property
@@ -36,9 +38,11 @@ class CalibrationResult:
         return {"ok": self.found.observable, **self.found.to_json()}
 
     @property
-    def figure_svg(self) -> str:
-        """The drawing."""
-        return self.report.figures[self.found.kind]
+    def artifacts(self) -> dict[str, bytes]:
+        """What is kept of it: the numbers, the patch of setup.json, the report, as files of a folder `calibration`."""
+        texts = {"calibration.json": self.content, "patch.json": self.found.patch}
+        named = {f"calibration/{name}": patch_text(content).encode() for name, content in texts.items()}
+        return named | self.report.files("calibration")
 
 
 def run_calibration(
@@ -56,16 +60,20 @@ def run_calibration(
 
 
 def in_child(folder: Path, options: dict[str, Any]) -> tuple[dict[str, Any], dict[str, Any]]:
-    """Calibrate inside `planner.sandbox.run_limited`: no arrays, and what the REST route answers.
+    """Calibrate inside `planner.sandbox.run_limited`: no arrays; the answer, and its files as base64.
 
     folder holds `options["files"]`, called `options["names"]`; kind, setup, target and radius_mm as for `run_calibration`.
     """
     setup = Setup.model_validate(options["setup"])
     paths = [folder / file for file in options["files"]]
     made = run_calibration(options["kind"], paths, setup, options["target"], options["radius_mm"], options["names"])
-    inputs = [{"name": name, "sha256": sha256} for name, sha256 in made.inputs]
-    report = made.report.html().decode()
-    return {}, {**made.content, "inputs": inputs, "figure_svg": made.figure_svg, "report_html": report}
+    files = {name: base64.b64encode(content).decode() for name, content in made.artifacts.items()}
+    return {}, {**made.content, "simulated": made.found.simulated, "files": files}
+
+
+def patch_text(content: dict[str, Any]) -> str:
+    """Return a patch of setup.json as its file holds it."""
+    return json.dumps(content, indent=1, allow_nan=False) + "\n"
 
 
 def _sha256(path: Path) -> str:

@@ -53,13 +53,19 @@ def current(session: Session, project_id: str, kind: str) -> Input:
     newest = select(InputRow).where(InputRow.project_id == project_id, InputRow.kind == kind)
     row = session.scalars(newest.order_by(InputRow.version.desc()).limit(1)).first()
     if row is None:
-        content = defaults()[kind.partition("-")[0]]
-        return Input(kind, 0, "" if content is None else digest_of(content), content)
+        return _default(kind)
     return Input(kind, row.version, row.sha256, json.loads(row.content))
 
 
+def _default(kind: str) -> Input:
+    content = defaults()[kind.partition("-")[0]]
+    return Input(kind, 0, "" if content is None else digest_of(content), content)
+
+
 def version_of(session: Session, project_id: str, kind: str, version: int) -> Input:
-    """Return an earlier version of an input; raises Refusal 404."""
+    """Return an earlier version of an input, 0 what it was before anybody gave one; raises Refusal 404."""
+    if version == 0:
+        return _default(kind)
     found = select(InputRow).where(
         InputRow.project_id == project_id, InputRow.kind == kind, InputRow.version == version
     )
@@ -74,6 +80,13 @@ def recent(session: Session, project_id: str, kind: str, limit: int) -> list[Inp
     newest = select(InputRow).where(InputRow.project_id == project_id, InputRow.kind == kind)
     rows = list(session.scalars(newest.order_by(InputRow.version.desc()).limit(limit)))
     return [Input(kind, row.version, row.sha256, json.loads(row.content)) for row in reversed(rows)]
+
+
+def versions_since(session: Session, project_id: str, kind: str, version: int) -> list[Input]:
+    """Return the versions of an input after `version`, oldest first."""
+    later = select(InputRow).where(InputRow.project_id == project_id, InputRow.kind == kind, InputRow.version > version)
+    rows = session.scalars(later.order_by(InputRow.version))
+    return [Input(kind, row.version, row.sha256, json.loads(row.content)) for row in rows]
 
 
 def put(store: Store, project_id: str, kind: str, content: Any, expected: int | None = None, who: str = "") -> Input:

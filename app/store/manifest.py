@@ -17,7 +17,7 @@ MAX_MEMBERS = 20_000
 Sha = Annotated[str, Field(pattern=r"^[0-9a-f]{64}$")]
 Stamp = Annotated[str, Field(max_length=32)]
 Count = Annotated[int, Field(ge=1, le=10**9)]
-Owner = Annotated[str, Field(pattern=r"^(part|scan|plan|alignment|assessment):[0-9]{1,9}$")]
+Owner = Annotated[str, Field(pattern=r"^(part|scan|plan|alignment|assessment|calibration):[0-9]{1,9}$")]
 
 
 class _Strict(BaseModel):
@@ -49,7 +49,7 @@ class _ScanPart(_Strict):
 
 
 class _ResultPart(_Strict):
-    kind: Literal["plan", "alignment", "assessment"]
+    kind: Literal["plan", "alignment", "assessment", "calibration"]
     number: Count
     sha256: Sha
     inputs: dict[str, Any]

@@ -1,4 +1,4 @@
-"""Results: plans, alignments and assessments, each bound to the digests of what it was made from."""
+"""Results: plans, alignments, assessments and calibrations, each bound to the digests of what it was made from."""
 
 from typing import Any
 
@@ -12,7 +12,7 @@ from app.store.journal import note
 from app.store.names import clean_text, now
 from app.store.projects import get, touch
 from app.store.refusal import not_found
-from app.store.result_records import VERSION_KEY, copy
+from app.store.result_records import OF, VERSION_KEY, copy
 from app.store.tables import ResultRow
 
 
@@ -22,7 +22,7 @@ def add(
 ) -> ResultRow:  # fmt: skip
     """Add a result with its files. The record in force is the one of this result, whatever is written down later."""
     get(session, project_id)
-    if kind != "plan":
+    if kind in OF:
         inputs = {VERSION_KEY: current(session, project_id, "record").version} | inputs
     of_kind = (ResultRow.project_id == project_id, ResultRow.kind == kind)
     highest = session.scalar(select(func.max(ResultRow.number)).where(*of_kind))

@@ -6,7 +6,7 @@ from sqlalchemy import JSON, BigInteger, ForeignKey, Index, Integer, String, Tex
 from sqlalchemy.orm import DeclarativeBase, Mapped, mapped_column
 
 INPUT_KINDS = ("part", "setup", "surface", "keypoints")
-RESULT_KINDS = ("plan", "alignment", "assessment")
+RESULT_KINDS = ("plan", "alignment", "assessment", "calibration")
 JOB_STATES = ("queued", "running", "done", "failed", "cancelled")
 
 
@@ -63,7 +63,7 @@ class ScanRow(Base):
 
 
 class ResultRow(Base):
-    """A plan, an alignment or an assessment, with the digests of what it was made from."""
+    """A plan, an alignment, an assessment or a calibration, with the digests of what it was made from."""
 
     __tablename__ = "results"
     __table_args__ = (UniqueConstraint("project_id", "kind", "number"),)

@@ -7,7 +7,7 @@ import { listen } from "./events.js";
 const RESULTS = ["plan", "alignment", "assessment"];
 const CONCERNS = {
   part: ["part", "surface", "setup", "keypoints", ...RESULTS],
-  setup: ["setup", ...RESULTS],
+  setup: ["setup", "calibrations", ...RESULTS],
   surface: ["surface", ...RESULTS],
   keypoints: ["keypoints", ...RESULTS],
   plan: ["keypoints", ...RESULTS],
@@ -16,11 +16,12 @@ const CONCERNS = {
   assessment: ["assessment"],
   project: ["project"],
   record: ["record"],
+  calibration: ["calibrations"],
 };
-const PATHS = { project: "", part: "/part", setup: "/setup", surface: "/surface", keypoints: "/keypoints", plan: "/plan", scans: "/scans", alignment: "/alignments", assessment: "/assessments", record: "/record", state: "/state" };
+const PATHS = { project: "", part: "/part", setup: "/setup", surface: "/surface", keypoints: "/keypoints", plan: "/plan", scans: "/scans", alignment: "/alignments", assessment: "/assessments", record: "/record", calibrations: "/calibrations", state: "/state" };
 const OPEN = new Set(["queued", "running"]);
 const NEWEST = new Set(["alignment", "assessment"]);
-const ALL = ["project", "part", "setup", "surface", "keypoints", "plan", "scans", "alignment", "assessment", "record"];
+const ALL = ["project", "part", "setup", "surface", "keypoints", "plan", "scans", "alignment", "assessment", "record", "calibrations"];
 
 export class Project {
   constructor(id, changed) {

@@ -1,4 +1,4 @@
-"""Calibrations over REST: files written from analytic truth come back as the truth, and nothing is kept."""
+"""Calibrations over REST: files written from analytic truth come back as the truth, kept and never put in force."""
 
 import hashlib
 import threading
@@ -57,7 +57,7 @@ def test_tilt_loss_is_found_drawn_and_put_in_force_by_the_client(client, address
     before = client.get(f"{address}/setup")
     sent = tilt_csv()
     answer = calibrated(client, address, "tilt", ("tilt.csv", sent))
-    assert answer.status_code == 200, answer.text
+    assert answer.status_code == 201, answer.text
     found = answer.json()
     assert found["ok"]
     assert found["kind"] == "tilt"
@@ -66,9 +66,12 @@ def test_tilt_loss_is_found_drawn_and_put_in_force_by_the_client(client, address
     assert {e["status"] for e in found["estimates"].values()} == {"measured"}
     assert found["patch"] == {"probe": {"tilt_loss_db_per_deg2": {"b": 1.7, "c": 0.8}}}
     assert found["inputs"] == [{"name": "tilt.csv", "sha256": hashlib.sha256(sent).hexdigest()}]
-    assert ET.fromstring(found["figure_svg"]).tag.endswith("}svg")
-    assert found["report_html"].startswith("<!doctype html>")
-    assert found["inputs"][0]["sha256"] in found["report_html"]
+    assert answer.headers["Location"] + "/report" == found["report"]
+    drawing = client.get(f"{answer.headers['Location']}/figures/tilt")
+    assert ET.fromstring(drawing.text).tag.endswith("}svg")
+    report = client.get(found["report"]).text
+    assert report.startswith("<!doctype html>")
+    assert found["inputs"][0]["sha256"] in report
     # Nothing is put in force by asking; the client merges the patch and says of which version it is.
     after = client.get(f"{address}/setup")
     assert (after.headers["ETag"], after.json()) == (before.headers["ETag"], before.json())
@@ -87,7 +90,7 @@ def test_couplant_from_a_bare_body_and_from_two_files(client, address):
         client, address, "couplant", ("a.csv", couplant_csv((5.0, 10.0))), ("b.csv", couplant_csv((15.0, 20.0)))
     )
     for answer in (bare, two):
-        assert answer.status_code == 200, answer.text
+        assert answer.status_code == 201, answer.text
         found = answer.json()
         assert found["estimates"]["sound_speed"]["value"] == pytest.approx(SPEED, abs=1e-3)
         assert found["estimates"]["delay"]["value"] == pytest.approx(DELAY, abs=1e-6)
@@ -98,7 +101,7 @@ def test_couplant_from_a_bare_body_and_from_two_files(client, address):
 
 def test_the_tcp_from_a_plane_uses_the_setup_in_force(client, address, plane_scan):
     answer = calibrated(client, address, "tcp", ("plane.csv", plane_scan), target="plane")
-    assert answer.status_code == 200, answer.text
+    assert answer.status_code == 201, answer.text
     found = answer.json()
     assert found["estimates"]["z"]["status"] == "held"
     for axis, truth in zip("cbaxy", [*TURN, *SHIFT[:2]], strict=True):
@@ -108,7 +111,8 @@ def test_the_tcp_from_a_plane_uses_the_setup_in_force(client, address, plane_sca
     real = true_tool(tool_setup(), TURN, SHIFT)
     tcp = found["patch"]["tool"]["tcp"]
     assert np.allclose([tcp["x_mm"], tcp["y_mm"], tcp["z_mm"]], real.xyz_mm, atol=0.3)
-    assert "SIMULATED" in found["report_html"]  # the simulator's own writer says so in the file
+    assert found["simulated"]
+    assert "SIMULATED" in client.get(found["report"]).text  # the simulator's own writer says so in the file
     other = calibrated(client, new_project(client, part=None), "tcp", ("plane.csv", plane_scan))
     assert other.json().get("patch") != found["patch"]
 
@@ -146,12 +150,20 @@ def test_target_and_radius_are_checked(client, address, plane_scan):
     assert error_of(client.post("/api/v1/projects/nobody/calibrations/tilt", content=b"x"), 404)
 
 
-def test_nothing_is_kept(client, server, address):
+def test_of_what_is_refused_or_deleted_nothing_stays(client, server):
+    address = new_project(client, part=None)
     blobs = server.data / "blobs"
     before = {p for p in blobs.rglob("*") if p.is_file()}
-    assert calibrated(client, address, "couplant", ("c.csv", couplant_csv((6.0, 11.0)))).status_code == 200
     error_of(calibrated(client, address, "tilt", ("c.csv", b"no,columns\n1,2\n")), 422)
+    assert client.get(f"{address}/calibrations").json() == []
     assert {p for p in blobs.rglob("*") if p.is_file()} == before
+    made = calibrated(client, address, "couplant", ("c.csv", couplant_csv((6.0, 11.0)))).headers["Location"]
+    assert {p for p in blobs.rglob("*") if p.is_file()} > before
+    assert client.delete(made).status_code == 204
+    assert {p for p in blobs.rglob("*") if p.is_file()} == before
+    for gone in (made, f"{made}/report", f"{made}/readings/0", f"{made}/files"):
+        assert error_of(client.get(gone), 404)["code"]
+    assert error_of(client.delete(made), 404)["code"] == "calibration-unknown"
 
 
 def test_the_server_answers_others_meanwhile(client, server, address, plane_scan):
@@ -169,6 +181,6 @@ def test_the_server_answers_others_meanwhile(client, server, address, plane_scan
         assert client.get("/api/v1/health").status_code == 200
         longest, asked = max(longest, time.monotonic() - start), asked + 1
     thread.join()
-    assert answers == [200]
+    assert answers == [201]
     assert asked > 10
     assert longest < 0.5 * (time.monotonic() - begun)

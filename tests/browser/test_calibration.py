@@ -47,14 +47,21 @@ def test_calibrate_see_use_and_undo(server, chromium, tmp_path):
     assert losses() == before
     change = page.locator(".calibrate table.patch tr", has_text="tilt_loss_db_per_deg2.c")
     assert [float(v) for v in change.locator("td.num").all_inner_texts()] == [before["c"], 0.8]
+    with context.expect_page() as report:
+        page.get_by_role("link", name="Report of the calibration: open").click()
+    report.value.get_by_text("Tilt loss of the probe").first.wait_for()
+    report.value.close()
     with page.expect_download() as got:
-        page.get_by_role("link", name="Report of the calibration").click()
-    got.value.save_as(tmp_path / "report.html")
-    assert "Tilt loss of the probe" in (tmp_path / "report.html").read_text()
+        page.get_by_role("link", name="Report of the calibration: PDF").click()
+    got.value.save_as(tmp_path / "report.pdf")
+    assert (tmp_path / "report.pdf").read_bytes().startswith(b"%PDF-")
+    listed = page.locator(".calibrate .past tr", has_text="tilt.csv")
+    assert "not used" in listed.inner_text()
 
     use = page.get_by_role("button", name="Use in the setup")
     use.dblclick()
-    page.locator(".calibrate .tag", has_text="in force").wait_for()
+    page.locator(".calibrate .row .tag", has_text="in force").wait_for()
+    listed.get_by_text("in force").wait_for()
     assert losses() == {"b": 1.7, "c": 0.8}
     assert use.is_disabled()
     undo = page.locator(".inspector footer").get_by_role("button", name="Undo")
@@ -68,9 +75,22 @@ def test_calibrate_see_use_and_undo(server, chromium, tmp_path):
     other = server.rest(f"/projects/{pid}/setup")
     other["tool"]["tcp"]["z_mm"] = 123.0
     server.rest(f"/projects/{pid}/setup", "PUT", other)
-    page.get_by_text("The cell was changed since.").wait_for()
+    page.get_by_text("It was computed with an earlier cell.").wait_for()
     assert use.is_disabled()
     assert losses() == before
+    # It is kept: a reload finds it again, with what it would have changed, and it can be deleted.
+    page.reload()
+    page.locator('[data-key="group-probe"]').click()
+    page.locator('[data-key="calibrate-probe"]').click()
+    listed.get_by_text("was in force").wait_for()
+    listed.get_by_role("button", name="Show calibration 1").click()
+    change.wait_for()
+    assert [float(v) for v in change.locator("td.num").all_inner_texts()] == [before["c"], 0.8]
+    page.get_by_text("It was computed with an earlier cell.").wait_for()
+    listed.get_by_role("button", name="Delete calibration 1").click()
+    page.locator("dialog button[type='submit']").click()
+    listed.wait_for(state="detached")
+    assert server.rest(f"/projects/{pid}/calibrations") == []
     refused = "the server responded with a status of 422"
     assert [c for c in page.watch.complaints if refused not in c] == []
     assert page.watch.foreign == []

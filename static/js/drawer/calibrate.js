@@ -1,10 +1,11 @@
 // Calibration from measurements: what they show, how well, drawn, and what of the setup they change.
 
-import { etagOf, upload } from "../api.js";
+import { API, del, get, upload } from "../api.js";
+import { confirm } from "../dialog.js";
 import { button, fill, h } from "../dom.js";
-import { at, withValue } from "../form.js";
 import { bytes, fixed } from "../format.js";
 import { issueList, tag, toneOf } from "../status.js";
+import { patchOf } from "./patch.js";
 
 const KINDS = {
   tilt: ["Tilt loss of the probe", "A flat target, the tool turned about B and about C. CSV: b_deg, c_deg, amplitude_pct"],
@@ -17,24 +18,51 @@ const NAMES = {
 };
 const UNITS = { us: "µs", "dB/deg^2": "dB/deg²" };
 
-/** A calibration that nobody has sent files for yet. */
-export const newCalibration = (kind) => ({ kind, target: "plane", radius: "", progress: null, answer: null, issues: [], madeFor: null, saving: false });
+const APPLIED = { now: ["good", "in force"], earlier: ["none", "was in force"], never: ["none", "not used"], nothing: ["none", "changes nothing"] };
+const WORDS = { nothing: "Nothing to change in the cell.", stale: "It was computed with an earlier cell. Send the files again.", key: "calibration" };
 
-/** Fields of a patch: [{path, value}], nested names as a path. */
-const leaves = (patch, path = []) => Object.entries(patch).flatMap(([key, value]) => (value !== null && typeof value === "object" ? leaves(value, [...path, key]) : [{ path: [...path, key], value }]));
-const merged = (setup, patch) => leaves(patch).reduce((s, { path, value }) => withValue(s, path, value), setup);
+/** A calibration that nobody has sent files for yet. */
+export const newCalibration = (kind) => ({ kind, target: "plane", radius: "", progress: null, number: null, issues: [], use: null });
 
 /** Draw the tab. `cal` is what is chosen and found; `local.draft` the form's unsaved changes. */
 export function calibrate(body, shell, local) {
   const cal = local.calibration;
+  const kept = shell.project.data.calibrations ?? [];
+  const answer = kept.find((c) => c.number === cal.number && c.created === cal.created) ?? null;
   const again = () => { if (shell.step === "cell" && local.calibration === cal) shell.drawer.draw(); };
-  const choose = (change) => { Object.assign(cal, change, { answer: null, issues: [] }); again(); };
+  const choose = (change) => { Object.assign(cal, change, { number: null, issues: [] }); again(); };
   const files = (chosen) => send(shell, cal, chosen, again);
   const close = button("Close", () => { cal.progress?.cancel(); local.calibration = null; shell.draw(); }, { class: "ghost tiny", key: "calibration-close" });
+  const path = answer && `${API}${shell.project.path}/calibrations/${answer.number}`;
+  // Unsaved changes of the form get the patch too, so that saving them does not take it back.
+  const draft = (merge) => { if (local.draft) local.draft = merge(local.draft); };
   fill(body, h("div", { class: "calibrate" },
-    h("div", { class: "stack" }, h("div", { class: "row" }, choices(cal, choose), cal.answer && drop(cal, files), close), cal.answer ? picture(cal.answer) : cal.progress ? waiting(cal) : drop(cal, files),
+    h("div", { class: "stack" }, h("div", { class: "row" }, choices(cal, choose), answer && drop(cal, files), close), answer ? picture(path, answer) : cal.progress ? waiting(cal) : drop(cal, files),
       local.draft && h("p", { class: "small soft" }, "The saved cell counts; its unsaved changes do not.")),
-    h("div", { class: "stack" }, cal.answer ? [table(cal.answer), change(shell, local, cal, again), issueList(cal.answer.issues)] : issueList(cal.issues))));
+    h("div", { class: "stack" }, answer ? [table(answer), cal.use && patchOf(shell, cal.use, WORDS, again, draft), reports(path), issueList(answer.issues)] : issueList(cal.issues), past(shell, cal, kept, again))));
+}
+
+/** Show a calibration that is kept. */
+async function pick(shell, cal, answer, again) {
+  Object.assign(cal, { kind: answer.kind, target: answer.options.target, radius: answer.options.radius_mm ?? "", number: answer.number, created: answer.created, issues: [], use: null });
+  again();
+  // The patch belongs to the setup it was computed with, whatever is in force now.
+  const madeFor = JSON.stringify(await get(`${shell.project.path}/setup?version=${answer.setup_version}`));
+  if (cal.number === answer.number) { cal.use = { patch: answer.patch, madeFor, saving: false }; again(); }
+}
+
+/** All calibrations of the project, newest first. */
+function past(shell, cal, kept, again) {
+  if (!kept.length) return null;
+  const remove = async (c) => {
+    const sure = await confirm(`Delete calibration ${c.number}?`, `${KINDS[c.kind][0]} from ${c.name}, with its readings and its report. The cell stays as it is.`, "Delete");
+    if (sure) await shell.do(async () => { await del(`${shell.project.path}/calibrations/${c.number}`); await shell.project.load(["calibrations"]); });
+  };
+  const row = (c) => h("tr", { class: c.number === cal.number ? "on" : null }, h("td", {}, button(`${c.number}`, () => pick(shell, cal, c, again), { class: "tiny", title: "Show", "aria-label": `Show calibration ${c.number}`, key: `calibration-${c.number}` })),
+    h("td", { class: "l" }, KINDS[c.kind][0]), h("td", { class: "l name", title: c.name }, c.name), h("td", { class: "l soft", title: c.created }, new Date(c.created).toLocaleString([], { dateStyle: "short", timeStyle: "short" })),
+    h("td", { class: "l" }, tag(...APPLIED[c.applied])),
+    h("td", {}, button("✕", () => remove(c), { class: "ghost tiny", "aria-label": `Delete calibration ${c.number}`, key: `calibration-del-${c.number}` })));
+  return h("div", { class: "past" }, h("h3", {}, "Calibrations of this project"), h("table", {}, h("tbody", {}, [...kept].reverse().map(row))));
 }
 
 function choices(cal, choose) {
@@ -47,7 +75,7 @@ function choices(cal, choose) {
 
 function drop(cal, send) {
   const input = h("input", { type: "file", name: "calibration-files", class: "hidden", multiple: true, onchange: () => send([...input.files]) });
-  const box = h("div", { class: cal.answer ? "drop low" : "drop" }, cal.answer ? h("span", { class: "small" }, "Other readings") : ["Drop the readings here", h("span", { class: "faint small" }, KINDS[cal.kind][1])], button("Choose files", () => input.click(), { key: "calibration-choose" }), input);
+  const box = h("div", { class: cal.number ? "drop low" : "drop" }, cal.number ? h("span", { class: "small" }, "Other readings") : ["Drop the readings here", h("span", { class: "faint small" }, KINDS[cal.kind][1])], button("Choose files", () => input.click(), { key: "calibration-choose" }), input);
   box.addEventListener("dragover", (e) => { e.preventDefault(); box.classList.add("over"); });
   box.addEventListener("dragleave", () => box.classList.remove("over"));
   box.addEventListener("drop", (e) => { e.preventDefault(); send([...e.dataTransfer.files]); });
@@ -61,16 +89,13 @@ async function send(shell, cal, files, again) {
   const { project } = shell;
   const fields = cal.kind === "tcp" ? { target: cal.target, radius_mm: cal.target === "sphere" ? cal.radius : "" } : {};
   const show = (share, text) => { cal.progress = { share, text, cancel: () => job.cancel() }; again(); };
-  Object.assign(cal, { answer: null, issues: [] });
+  Object.assign(cal, { number: null, issues: [] });
   const job = upload("POST", `${project.path}/calibrations/${cal.kind}`, files.map((f) => ["file", f]), fields, (share, sent, total) => show(share, share < 1 ? `${bytes(sent)} of ${bytes(total)}` : "Calibrating"));
   show(0, "Sending");
   try {
     const answer = await job.promise;
-    // The patch belongs to the setup it was computed with: the one shown here, or one that somebody saved meanwhile.
-    const path = `${project.path}/setup`;
-    const same = () => etagOf(path) === `"${answer.setup_version}"`;
-    if (!same()) await project.load(["setup"]);
-    Object.assign(cal, { answer, madeFor: same() ? JSON.stringify(project.data.setup) : null });
+    await project.load(["setup", "calibrations"]);
+    await pick(shell, cal, answer, again);
   } catch (error) {
     cal.issues = error.issues ?? [{ severity: "error", code: "fault", message: error.message, remedy: "", where: "" }];
   } finally {
@@ -88,45 +113,9 @@ function table(answer) {
   return h("table", {}, h("thead", {}, h("tr", {}, [`${answer.readings} readings`, "Value", "± 95 %", "", "Status"].map((t, i) => h("th", { scope: "col", class: i > 2 ? "l" : null }, t)))), h("tbody", {}, Object.entries(answer.estimates).map(row)));
 }
 
-/** The patch, field by field, and the button that puts it in force. */
-function change(shell, local, cal, again) {
-  const { project } = shell;
-  const { setup } = project.data;
-  const fields = leaves(cal.answer.patch);
-  if (!fields.length) return h("p", { class: "small" }, "Nothing to change in the cell.");
-  const text = (v) => (v === null || v === undefined ? "auto" : typeof v === "number" ? String(Number(v.toPrecision(9))).replace("-", "−") : String(v));
-  const done = fields.every(({ path, value }) => at(setup, path) === value);
-  const stale = !done && JSON.stringify(setup) !== cal.madeFor;
-  const old = cal.madeFor ? JSON.parse(cal.madeFor) : setup;
-  const use = async () => {
-    if (cal.saving) return;
-    cal.saving = true;
-    again();
-    await shell.do(async () => {
-      try {
-        await project.saveSetup(merged(setup, cal.answer.patch));
-        if (local.draft) local.draft = merged(local.draft, cal.answer.patch);
-      } catch (error) {
-        if (error.status === 412) await project.load(["setup"]);
-        throw error;
-      } finally { cal.saving = false; }
-    });
-    again();
-  };
-  return [h("table", { class: "patch" }, h("thead", {}, h("tr", {}, ["Of the cell", "Before", "", "After"].map((t) => h("th", { scope: "col" }, t)))), h("tbody", {}, fields.map(({ path, value }) => h("tr", {}, h("td", {}, path.join(".")), h("td", { class: "num" }, text(at(old, path))), h("td", {}, "→"), h("td", { class: "num" }, text(value)))))),
-    stale && h("p", { class: "small" }, tag("warn", "The cell was changed since. Send the files again.")),
-    h("div", { class: "row" }, button("Use in the setup", use, { class: "primary", disabled: done || stale || cal.saving, key: "calibration-use" }), done && tag("good", "in force"), report(cal.answer))];
+function reports(path) {
+  const link = (format, word) => h("a", { href: `${path}/report?format=${format}${format === "html" ? "" : "&download=true"}`, target: "_blank", rel: "noopener", "aria-label": `Report of the calibration: ${word}` }, word);
+  return h("div", { class: "row" }, h("span", { class: "soft small" }, "Report:"), link("html", "open"), link("pdf", "PDF"), link("csv", "CSV"), link("json", "JSON"), h("a", { href: `${path}/files`, "aria-label": "Documents of the calibration" }, "ZIP"));
 }
 
-function report(answer) {
-  return h("a", { href: "#", download: `calibration-${answer.kind}.html`, "aria-label": "Report of the calibration", onclick: (e) => {
-    const source = URL.createObjectURL(new Blob([answer.report_html], { type: "text/html" }));
-    e.currentTarget.href = source;
-    setTimeout(() => URL.revokeObjectURL(source), 10000);
-  } }, "Report");
-}
-
-function picture(answer) {
-  const source = URL.createObjectURL(new Blob([answer.figure_svg], { type: "image/svg+xml" }));
-  return h("div", { class: "figure" }, h("img", { src: source, alt: `${KINDS[answer.kind][0]}: readings and fit`, onload: () => URL.revokeObjectURL(source) }));
-}
+const picture = (path, answer) => h("div", { class: "figure" }, h("img", { src: `${path}/figures/${answer.kind}`, alt: `${KINDS[answer.kind][0]}: readings and fit` }));

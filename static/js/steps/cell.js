@@ -74,8 +74,9 @@ export function drawer(shell) {
   };
   const fit = local.fit && { key: "fit", title: "BASE from touched points", draw: (body) => baseFit(body, local.fit, shell.project.id, () => (local.draft ?? shell.project.data.setup).placement, use) };
   const calibration = local.calibration && { key: "calibrate", title: "Calibrate", draw: (body) => calibrate(body, shell, local) };
-  // What is in force, and whether there are unsaved changes, is part of what a calibration shows.
-  const stamp = local.calibration ? `${local.calibration.kind} ${Boolean(local.draft)} ${JSON.stringify(setup)}` : "fit";
+  // What is in force, whether there are unsaved changes, and what is kept, is part of what a calibration shows.
+  const kept = (shell.project.data.calibrations ?? []).map((c) => `${c.number} ${c.created} ${c.applied}`).join();
+  const stamp = local.calibration ? `${local.calibration.kind} ${Boolean(local.draft)} ${JSON.stringify(setup)} ${kept}` : "fit";
   return { stamp, tabs: [fit, calibration].filter(Boolean) };
 }
 
