@@ -20,6 +20,7 @@ from app.plan import Artifacts, Plan, load_plan
 from app.report.batch import batch_report
 from app.report.package import Report
 from app.steps.align import AlignOptions
+from app.steps.calibrate import patch_text
 from app.steps.non_rigid import follow
 from app.steps.scans import cloud_of, read_scans
 from planner.errors import EchoBaseError, fail
@@ -58,9 +59,9 @@ class BatchResult:
 
     @property
     def artifacts(self) -> Artifacts:
-        """batch.json and the report as batch/report.html, pdf, json, csv."""
-        text = json.dumps(self.content, indent=1, allow_nan=False) + "\n"
-        return {"batch.json": text.encode(), **self.report.files("batch")}
+        """batch.json, its patch of setup.json (empty if there is nothing to change), and batch/report.html, pdf, json, csv."""
+        text, patch = (patch_text(content).encode() for content in (self.content, self.content["patch"]))
+        return {"batch.json": text, "batch/patch.json": patch, **self.report.files("batch")}
 
 
 def run_batch(folder: Path, items: Sequence[Path], options: AlignOptions, progress: Progress) -> BatchResult:
@@ -157,7 +158,7 @@ def _correction(path: Path, name: str) -> BatchItem:
         except (ValueError, KeyError, TypeError):
             simulated = False
     npz = field.read_bytes() if field.is_file() else None
-    return BatchItem(name, content, hashlib.sha256(text).hexdigest(), npz, simulated)
+    return BatchItem(name, content, hashlib.sha256(raw).hexdigest(), npz, simulated)
 
 
 def _aligned(plan: Plan, scan: Path, name: str, options: AlignOptions) -> BatchItem:
