@@ -40,9 +40,11 @@ def locate(points: EdgePoints, cosine: Array, beam_width_mm: float) -> EdgePoint
         return points
     gap = np.maximum(points.gap_mm * np.clip(cosine, 0.2, 1.0), 1e-9)
     blend, width = fit_beam(points.window, gap, beam_width_mm)
-    at, _ = place(points.window, gap, blend, width)
+    at, misfit = place(points.window, gap, blend, width)
     same = np.array_equal(points.window, points.window_other, equal_nan=True)
-    return replace(points, at=at, at_other=at if same else place(points.window_other, gap, blend, width)[0])
+    return replace(
+        points, misfit=misfit, at=at, at_other=at if same else place(points.window_other, gap, blend, width)[0]
+    )
 
 
 def fit_beam(window: Array, gap_mm: Array, beam_width_mm: float) -> tuple[float, float]:

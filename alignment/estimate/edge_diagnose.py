@@ -17,6 +17,8 @@ from planner.setup import Setup
 
 # No robot and no beam leaves crossings this far (rms, mm) off the edges of a part that is as its CAD.
 OFF_EDGES_MM = 0.5
+# With fewer of the crossings on their edges than this, something is wrong with more than a few.
+LEAST_AGREE = 0.7
 # A crossing that belongs to no edge counts as this far off (mm).
 UNMATCHED_MM = 0.5
 # Crossings that lie farther off than this, all in all (rms, mm), are worth a look for what would explain them.
@@ -34,7 +36,7 @@ def edge_issues(found: MapFit, setup: Setup) -> list[Issue]:
     """Return warnings where the placement does not fit the edges that were crossed, and where they are seen late."""
     if found.edges is None:
         return []
-    return _off(found.edges["rms_mm"]) + _late(found.edges, setup)
+    return _off(found.edges) + _late(found.edges, setup)
 
 
 def _late(edges: dict[str, Any], setup: Setup) -> list[Issue]:
@@ -53,17 +55,19 @@ def _late(edges: dict[str, Any], setup: Setup) -> list[Issue]:
     return [Issue("warning", "edges-late", text, remedy, "scan")]
 
 
-def _off(off_mm: float) -> list[Issue]:
-    if off_mm <= OFF_EDGES_MM:
+def _off(edges: dict[str, Any]) -> list[Issue]:
+    off_mm, used, crossings = edges["rms_mm"], edges["used"], edges["crossings"]
+    if off_mm > OFF_EDGES_MM:
+        what = f"at this placement the crossings lie {off_mm:.2f} mm rms off the CAD's edges"
+    elif crossings >= LEAST_CROSSINGS and used < LEAST_AGREE * crossings:
+        what = f"only {used} of {crossings} crossings lie on the CAD's edges at this placement"
+    else:
         return []
-    text = (
-        f"at this placement the crossings lie {off_mm:.2f} mm rms off the CAD's edges: the part is trimmed otherwise or has "
-        "sprung back, or the clock or the laws of the scan are not as said; in the plane sigma does not hold."
-    )
+    why = "the part has sprung back or is trimmed otherwise, something lies on it, or the laws of the scan are not as said"
     remedy = (
         "Look where they lie off; if the part has sprung back, run the alignment as non-rigid: it stays on the edges."
     )
-    return [Issue("warning", "off-edges", text, remedy, "scan")]
+    return [Issue("warning", "off-edges", f"{what}: {why}; along the surface it may be elsewhere.", remedy, "scan")]
 
 
 def order_by_edges(

@@ -31,8 +31,9 @@ class EdgePoints:
     on_base, off_base (k, 3): where their laws stand, mm; share_on, share_off (k,): their amplitudes over the plateau.
     window (k, 8): shares from three readings further on to three further off the part, NaN where there are none to trust;
     window_other (k, 8): the same if tilt takes of the echo what it may take as well. at, at_other (k,): place of the edge
-    from on (0) to off (1), by either. travel_base (k, 3): unit direction of travel. along (k,): True if found along the
-    pass, False if across the laws. pass_id, s_mm, law (k,).
+    from on (0) to off (1), by either. misfit (k,): mean squared misfit of the shares to the beam's S-curve.
+    travel_base (k, 3): unit direction of travel. along (k,): True if found along the pass, False if across the laws.
+    pass_id, s_mm, law (k,).
     """
 
     on_base: Array
@@ -43,6 +44,7 @@ class EdgePoints:
     window_other: Array
     at: Array
     at_other: Array
+    misfit: Array
     travel_base: Array
     along: NDArray[np.bool_]
     pass_id: NDArray[np.int32]
@@ -106,6 +108,7 @@ def edge_points(cloud: PointCloud, line: PoseLine, probe: Probe, loss_db: Array,
         _windows(others[1], line, pose, law),
         np.full(len(pose), 0.5),
         np.full(len(pose), 0.5),
+        np.zeros(len(pose)),
         line.travel_base[pose[:, 0]],
         np.repeat([True, False], [len(i), len(j)]),
         line.pass_id[pose[:, 0]],
@@ -207,5 +210,5 @@ def _none() -> EdgePoints:
     no, none = np.zeros(0, dtype=bool), np.zeros(0, dtype=np.int32)
     w = np.zeros((0, 8))
     return EdgePoints(
-        z3, z3.copy(), z, z.copy(), w, w.copy(), z.copy(), z.copy(), z3.copy(), no, none, z.copy(), z.copy()
+        z3, z3.copy(), z, z.copy(), w, w.copy(), z.copy(), z.copy(), z.copy(), z3.copy(), no, none, z.copy(), z.copy()
     )

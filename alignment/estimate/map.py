@@ -22,7 +22,7 @@ from alignment.estimate.pose_line import PoseLine, pose_line
 from alignment.estimate.problem import Problem
 from alignment.estimate.robust_fit import robust_fit
 from alignment.estimate.surface_rows import Rows, same_afresh
-from alignment.estimate.system import BIAS_SHARE, LAG_SIGMA_MM, EdgeData, System, nuisance_columns
+from alignment.estimate.system import BIAS_SHARE, EdgeData, System, nuisance_columns
 from planner.frames import Array, Transform
 from planner.setup import Setup
 from planner.surface.boundary import boundary
@@ -43,6 +43,9 @@ MUCH_WORSE = 1.1
 # Tails that the data show widen the claim by a few per cent; more comes of the prior's own doubt about long correlations, which
 # the covariance has in it already (docs/alignment.md, Calibration).
 MOST_WIDER = 1.1
+# A fall of the echo that misses the beam's S-curve by more than this (mean square of shares, each at most 0.01) is no edge's
+# alone: three of its eight readings are elsewhere, as where the tilt of a part that sprang back takes some of it.
+MOST_MISFIT = 3.5e-3
 # Noise models that are enough to step with; the last round takes them all.
 FEW = 8
 
@@ -84,7 +87,7 @@ def align_map(
     """Return the estimate, or what the capture came to where nothing can be estimated.
 
     stay_on_edges: of a part that sprang back, say where its edges put it, because its shape will be followed; else where
-    least of the shape is left, even if that is a slide off the edges.
+    least of the shape is left, even if that is a slide off the edges: the covariance then reaches to where they put it.
     """
     problem = Problem(curved, setup)
     captured = capture(cloud, problem)
@@ -97,16 +100,38 @@ def align_map(
     if isinstance(found, MapFit) and not same_afresh(patches, curved, found.T_base_part, found.rows):
         # Feet that were followed over a fold: now every patch asks the whole surface at every step.
         strict = replace(patches, follower=Follower(curved))
+        patches = strict
         found = fit_captured(problem, captured, strict, crossed, stay_on_edges)
+    if crossed is not None and isinstance(found, MapFit) and _shape_mm(found) > MUCH_WORSE * SHAPE_MM:
+        # A slide along the shape of a part that sprang back and a late clock explain each other: then the clock is right.
+        found = fit_captured(problem, captured, patches, crossed.as_said(), stay_on_edges, sprung=True)
     return found
 
 
+def _shape_mm(found: MapFit) -> float:
+    """Return what the estimate leaves of the patches it rests on (rms, mm)."""
+    used = found.used
+    return float(np.sqrt(np.average(found.rows.r[used] ** 2, weights=found.patches.count[used]))) if used.any() else 0.0
+
+
 def fit_captured(
-    problem: Problem, captured: Captured, patches: Patches, crossed: EdgeData | None, stay_on_edges: bool
+    problem: Problem,
+    captured: Captured,
+    patches: Patches,
+    crossed: EdgeData | None,
+    stay_on_edges: bool,
+    sprung: bool = False,
 ) -> MapFit | Captured:
+    """Return the estimate from where the capture led; sprung: the part is known to have another shape than its CAD."""
     setup, curved = problem.setup, problem.curved
     robust = robust_fit(patches, problem, captured.T_base_part, crossed)
-    if robust.edges is not None:
+    firm = (
+        robust_fit(patches, problem, robust.T_base_part, crossed, firm=True) if sprung and crossed is not None else None
+    )
+    firm = None if firm is None or firm.edges is None else firm
+    if firm is not None and stay_on_edges:
+        robust = firm
+    elif robust.edges is not None:
         # Now that the edges are known, so is the angle at which they were crossed.
         known = robust.edges.rows(problem, robust.T_base_part)
         sharper = locate(robust.edges.points, known.cosine, setup.probe.beam_width_mm)
@@ -129,13 +154,21 @@ def fit_captured(
         strain = lock_strain(problem, T, free.covariance[:6, :6]) if i == 0 else strain
         held = held_basis(free.covariance[:6, :6], problem.lock_rows(T))
         state, converged = _settle(state, system, mix, held)
-    kept = _plain_if_sprung(state, system, robust.T_base_part, held, stay_on_edges)
+    if firm is not None and stay_on_edges:
+        kept = replace(state, T_base_part=_with_held(problem, firm.T_base_part, held))
+    else:
+        kept = _plain_if_sprung(state, system, _with_held(problem, robust.T_base_part, held))
     # The plain fit has settled, even where the careful one ran off after the shape.
     state, converged = kept, converged or kept is not state
     T = state.T_base_part
     post = _solve(state, system, mix, held)
     scale = problem.prior_sigma
     covariance = _claimed(state, system, mix, held, post.covariance[:6, :6])
+    if firm is not None:
+        # Shape that a slide explains as well as the edges explain the place: the truth may be at either.
+        apart = problem.total(firm.T_base_part) - problem.total(T)
+        apart = apart - held @ (held.T @ apart)
+        covariance = covariance + np.outer(apart, apart)
     found = directions(covariance, held, problem.lock_rows(T), scale, problem.moments_base(T), setup.tolerances)
     now = system.surface(T)
     return MapFit(
@@ -156,6 +189,7 @@ def edge_data(cloud: PointCloud, problem: Problem, line: PoseLine | None, T_base
     if len(points) == 0:
         return None
     points = locate(points, np.ones(len(points)), probe.beam_width_mm)
+    points = points.take(points.misfit < MOST_MISFIT)
     return EdgeData(points, edges, np.zeros(len(points), dtype=bool), BIAS_SHARE * probe.beam_width_mm)
 
 
@@ -206,22 +240,21 @@ def _settle(state: State, system: System, mix: Mixture, held: Array) -> tuple[St
     return state, moves < 100.0 * SOLVED_MM
 
 
-def _plain_if_sprung(state: State, system: System, T_plain: Transform, held: Array, stay_on_edges: bool) -> State:
+def _with_held(problem: Problem, T_base_part: Transform, held: Array) -> Transform:
+    """Return the placement with its held directions at their nominal value."""
+    return problem.step(T_base_part, -(held @ (held.T @ problem.total(T_base_part))))
+
+
+def _plain_if_sprung(state: State, system: System, T_plain: Transform) -> State:
     """Return the plain robust fit instead, where the careful one took the shape of a part that sprang back for noise.
 
-    What is left is then no noise of a robot, and the best rigid placement is the one that leaves least of it; or, to stay
-    on the edges, the one that does not explain the shape by a motion along the surface that never was.
+    What is left is then no noise of a robot, and the best rigid placement is the one that leaves least of it.
     """
-    plain = system.problem.step(T_plain, -(held @ (held.T @ system.problem.total(T_plain))))
     left = _rms_mm(system, state.T_base_part)
-    if left <= MUCH_WORSE * SHAPE_MM and not stay_on_edges:
+    if left <= MUCH_WORSE * SHAPE_MM:
         return state
-    least = _rms_mm(system, plain)
-    of_edges = [_edge_rms_mm(system, T, state.nuisance) for T in (state.T_base_part, plain)]
-    slid = stay_on_edges and of_edges[0] > MUCH_WORSE * of_edges[1]
-    if least > SHAPE_MM and (left > MUCH_WORSE * least or slid):
-        return replace(state, T_base_part=plain)
-    return state
+    least = _rms_mm(system, T_plain)
+    return replace(state, T_base_part=T_plain) if least > SHAPE_MM and left > MUCH_WORSE * least else state
 
 
 def _rms_mm(system: System, T_base_part: Transform) -> float:
@@ -243,7 +276,7 @@ def _edge_report(state: State, system: System, post: Posterior) -> dict[str, Any
     if system.edges is None:
         return None
     used = system.edges.used
-    to_mm = np.array([system.edges.bias_sigma_mm, LAG_SIGMA_MM])
+    to_mm = np.array([system.edges.bias_sigma_mm, system.edges.lag_sigma_mm])
     # What bias and lag come to together is known even where every edge was crossed outwards and they cannot be told apart.
     both = post.covariance[6:8, 6:8] * np.outer(to_mm, to_mm)
     bias, lag = state.nuisance[:2] * to_mm

@@ -23,6 +23,8 @@ LEAST_CROSSINGS = 12
 WIDE_MM, WIDE_STEPS, NARROWER, ANNEALED = 3.0, 3, 0.7, 15
 # A row is never taken to know more than this (mm): noise is shared between rows.
 SHARED_MM = 0.1
+# Of a part that sprang back: how much more a crossing says than a patch, and how far its shape may shift one (mm, one sigma).
+FIRM, FIRM_FLOOR_MM = 30.0, 0.2
 SETTLED_MM = 1e-3
 LEAST_SHARE = 1.0 / 32.0
 
@@ -37,8 +39,13 @@ class RobustFit:
     settled: bool
 
 
-def robust_fit(patches: Patches, problem: Problem, start: Transform, edges: EdgeData | None) -> RobustFit:
-    """Return the placement of a robust fit (Tukey's biweight, scales from the data) of patches and crossings together."""
+def robust_fit(
+    patches: Patches, problem: Problem, start: Transform, edges: EdgeData | None, firm: bool = False
+) -> RobustFit:
+    """Return the placement of a robust fit (Tukey's biweight, scales from the data) of patches and crossings together.
+
+    firm: the edges say where the part is, whatever its shape would rather have; the surface says the rest.
+    """
     T, settled = start, False
     last, last_z, share = np.inf, np.zeros(6), 1.0
     used = np.zeros(len(patches), dtype=bool)
@@ -59,7 +66,7 @@ def robust_fit(patches: Patches, problem: Problem, start: Transform, edges: Edge
         normal[:6, :6] += (x * w[:, None]).T @ x
         pull[:6] -= (x * w[:, None]).T @ r
         if edges is not None:
-            edges = _add_edges(edges, problem, T, nuisance, normal, pull, _scale_limits(i))
+            edges = _add_edges(edges, problem, T, nuisance, normal, pull, _scale_limits(i, firm), FIRM if firm else 1.0)
         z = share * np.linalg.solve(normal, pull)
         T = problem.step(T, z[:6])
         nuisance = nuisance + z[6:]
@@ -77,17 +84,18 @@ def robust_fit(patches: Patches, problem: Problem, start: Transform, edges: Edge
     return RobustFit(T, used, edges, settled)
 
 
-def _scale_limits(i: int) -> tuple[float, float]:
+def _scale_limits(i: int, firm: bool) -> tuple[float, float]:
     """Return the least and the largest scale (mm) of the crossings at step i: wide, then narrower step by step, then free.
 
     The scale of a poor start lets false crossings in, which keep the start poor; narrowing it whatever the residuals say
     (graduated non-convexity, A. Blake, A. Zisserman, Visual Reconstruction, MIT Press 1987) leads to where most agree.
     """
+    floor_mm = FIRM_FLOOR_MM if firm else EDGE_FLOOR_MM
     if i < WIDE_STEPS:
         return WIDE_MM, np.inf
     if i < ANNEALED:
-        return EDGE_FLOOR_MM, max(EDGE_FLOOR_MM, WIDE_MM * NARROWER ** (i - WIDE_STEPS))
-    return EDGE_FLOOR_MM, np.inf
+        return floor_mm, max(floor_mm, WIDE_MM * NARROWER ** (i - WIDE_STEPS))
+    return floor_mm, np.inf
 
 
 def _add_edges(
@@ -98,6 +106,7 @@ def _add_edges(
     normal: Array,
     pull: Array,
     limits_mm: tuple[float, float],
+    firmness: float,
 ) -> EdgeData:
     """Add the crossings to the normal equations in place; return the edges with the crossings that belong."""
     found = edges.rows(problem, T)
@@ -109,7 +118,7 @@ def _add_edges(
     sigma = float(np.clip(mad_sigma(r[valid], EDGE_FLOOR_MM, about_zero=True), *limits_mm))
     used = valid & (np.abs(r) < EDGE_REJECT * sigma)
     x = np.hstack([found.jacobian * problem.prior_sigma, columns])[used]
-    w = tukey_weights(r[used], sigma) / (SHARED_MM + sigma) ** 2
+    w = firmness * tukey_weights(r[used], sigma) / (SHARED_MM + sigma) ** 2
     normal += (x * w[:, None]).T @ x
     pull -= (x * w[:, None]).T @ r[used]
     return replace(edges, used=used)

@@ -157,4 +157,6 @@ def joined_edges(members: Sequence[Member], parts: Sequence[EdgeData | None]) ->
         return None
     every = EdgePoints(*(np.concatenate([getattr(p, f.name) for p in points]) for f in fields(EdgePoints)))
     none = np.zeros(len(every), dtype=bool)
-    return SeveralEdges(every, given[0].map, none, given[0].bias_sigma_mm, tuple(members), tuple(parts))
+    return SeveralEdges(
+        every, given[0].map, none, given[0].bias_sigma_mm, given[0].lag_sigma_mm, tuple(members), tuple(parts)
+    )

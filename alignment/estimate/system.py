@@ -19,27 +19,35 @@ MOST_EDGE_ROWS = 90
 LAWS_PER_ROW = 12.0
 COARSENINGS = 20
 # What the beam's asymmetry and the detection may shift every crossing by, as a share of the beam width, and what a late
-# clock may shift it by along the travel (mm: 3 to 6 ms at 50 to 100 mm/s); and tilt takes more or less of the echo at a curved
+# clock may shift it by along the travel (mm); and tilt takes more or less of the echo at a curved
 # rim than the set-up says. All are estimated along: opposite edges, opposite passes, rims of different slope tell them apart.
 BIAS_SHARE = 0.04
-LAG_SIGMA_MM = 0.3
+LAG_SIGMA_MM = 0.1
 NUISANCES = 3
+# As good as none.
+AS_SAID_MM = 1e-3
 # How far off what the set-up says of tilt at the rim may be, in differences between its two extremes.
 TILT_DOUBT = 2.0
 
 
 @dataclass(frozen=True, eq=False)
 class EdgeData:
-    """The crossings of a scan, the CAD edges, and which crossings belong to them (k,)."""
+    """The crossings of a scan, the CAD edges, which crossings belong to them (k,), and how unsure bias and lag are."""
 
     points: EdgePoints
     map: EdgeMap
     used: NDArray[np.bool_]
     bias_sigma_mm: float
+    lag_sigma_mm: float = LAG_SIGMA_MM
 
     def rows(self, problem: Problem, T_base_part: Transform) -> EdgeRows:
         """Return the residuals of all crossings."""
         return edge_rows(self.points, self.map, problem.curved, T_base_part, problem.centre_mm(T_base_part))
+
+    def as_said(self) -> "EdgeData":
+        """Return the same crossings with bias, lag and tilt taken as the set-up has them."""
+        points = replace(self.points, window_other=self.points.window, at_other=self.points.at)
+        return replace(self, points=points, bias_sigma_mm=AS_SAID_MM, lag_sigma_mm=AS_SAID_MM)
 
 
 @dataclass(frozen=True, eq=False)
@@ -87,7 +95,7 @@ def nuisance_columns(edges: EdgeData, found: EdgeRows) -> Array:
     """Return how the residuals of crossings change with edge bias, lag and tilt loss (k, 3), per sigma of theirs."""
     points = edges.points
     tilted = TILT_DOUBT * (points.at - points.at_other) * points.gap_mm * found.cosine
-    return np.column_stack([np.full(len(found.r), -edges.bias_sigma_mm), -LAG_SIGMA_MM * found.lag, tilted])
+    return np.column_stack([np.full(len(found.r), -edges.bias_sigma_mm), -edges.lag_sigma_mm * found.lag, tilted])
 
 
 def _edge_row(edges: EdgeData, found: EdgeRows) -> NDArray[np.int64]:

@@ -18,7 +18,7 @@ MOST_POSES = 4000
 # A direction is judged by this many of its standard deviations.
 SIGMAS = 2.0
 # What the operator must accept, by parts of the issues' codes.
-PARTIAL = ("not-rigid", "harmful", "lock-contradicted")
+PARTIAL = ("not-rigid", "harmful", "lock-contradicted", "off-edges")
 
 
 def limit_issues(centroid_shift_mm: float, turn_deg: float, setup: Setup) -> list[Issue]:

@@ -30,6 +30,8 @@ LEAST_NODES, LEAST_PASSES = 20, 3
 # The field must be this much likelier than noise alone (logarithm).
 LEAST_GAIN = 8.0
 LEAST_SUPPORT = 0.02
+# Deviations beyond so many `tolerances.position_mm` are worth a word even where they cannot be followed.
+MUCH = 3.0
 # Patches this many robust standard deviations off the deformed part belong to something else; scatter is at least this.
 REJECT, SCATTER_MM = 5.0, 0.01
 
@@ -41,6 +43,7 @@ class FieldFit:
 
     patches, rows at that placement; used (p,): those that belong to the part; rest_mm (p,): measured minus expected
     distance with the field followed, mm. gain: log evidence. cv_mm, cv_rigid_mm: rms with which passes foretell each other.
+    seen: a field far likelier than noise, and larger than any noise, is there, followed or not.
     """
 
     field: Field | None
@@ -55,6 +58,7 @@ class FieldFit:
     cv_mm: float | None = None
     cv_rigid_mm: float | None = None
     samples: Surroundings | None = None
+    seen: bool = False
 
 
 def fit_field(
@@ -75,9 +79,9 @@ def fit_field(
     rows = patch_rows(patches, curved, T_base_part, problem.centre_mm(T_base_part))
     used = believable(patches, rows, setup)
 
-    def nothing(reason: str, found: Evidence | None = None) -> FieldFit:
+    def nothing(reason: str, found: Evidence | None = None, seen: bool = False) -> FieldFit:
         gain = 0.0 if found is None else found.gain
-        return FieldFit(None, reason, T_base_part, np.zeros(6), patches, rows, used, rows.r, gain)
+        return FieldFit(None, reason, T_base_part, np.zeros(6), patches, rows, used, rows.r, gain, seen=seen)
 
     if used.sum() < LEAST_NODES:
         return nothing(f"only {int(used.sum())} patches of readings lie on the surface")
@@ -87,8 +91,12 @@ def fit_field(
         return nothing(too_few)
     few, evidence = _learn(few, 2.0 * problem.half_size_mm, setup.probe.swath_mm)
     cv, cv_rigid = _foretold(few, evidence)
-    if evidence.gain < LEAST_GAIN or cv >= cv_rigid:
+    if evidence.gain < LEAST_GAIN:
         return nothing("what is left after the rigid alignment is explained by noise", evidence)
+    if cv >= cv_rigid:
+        large = float(np.abs(rows.r[used]).max()) > MUCH * setup.tolerances.position_mm
+        reason = "its passes lie too far apart to foretell each other"
+        return nothing(reason, evidence, large)
     around = samples_of(curved)
     carry = _Carrier(curved, setup, patches, evidence.theta, evidence.axes, around)
     field = carry.field(rows, used, T_base_part, None)
@@ -101,7 +109,7 @@ def fit_field(
     field = carry.field(rows, used, T, field)
     rest = carry.rest(rows, field, T)
     used = used & rows.valid & (np.abs(rest) < REJECT * mad_sigma(rest[used], SCATTER_MM, about_zero=True))
-    return FieldFit(field, None, T, xi, patches, rows, used, rest, evidence.gain, cv, cv_rigid, around)
+    return FieldFit(field, None, T, xi, patches, rows, used, rest, evidence.gain, cv, cv_rigid, around, True)
 
 
 def _learn(nodes: Nodes, size_mm: float, swath_mm: float) -> tuple[Nodes, Evidence]:
