@@ -1,6 +1,7 @@
 """What a person hands over as files or words: setup, key points, offsets. Every fault is an `Issue` that names the place."""
 
 import json
+from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
@@ -55,6 +56,25 @@ def keypoints_from(data: Any, where: str = "keypoints.json") -> list[KeyPoint]:
 def read_setup(path: Path | None) -> Setup:
     """Return the settings of a file, or the defaults when there is none."""
     return Setup() if path is None else setup_from(read_json(path), path.name)
+
+
+def patched(setup: Setup, patches: Sequence[Path]) -> Setup:
+    """Return the settings with patches of `echobase calibrate` or `batch` merged in, one after the other."""
+    for path in patches:
+        patch = read_json(path)
+        if not isinstance(patch, dict):
+            raise fail("patch-invalid", "a patch is an object with fields of setup.json.", "Correct it.", path.name)
+        setup = setup_from(_merged(setup.model_dump(mode="json"), patch), path.name)
+    return setup
+
+
+def _merged(content: dict[str, Any], patch: dict[str, Any]) -> dict[str, Any]:
+    """Return content with the fields of a patch; objects are merged, anything else is replaced."""
+    both = {k: (content.get(k), v) for k, v in patch.items()}
+    return content | {
+        k: _merged(old, new) if isinstance(old, dict) and isinstance(new, dict) else new
+        for k, (old, new) in both.items()
+    }
 
 
 def with_box(setup: Setup, six: tuple[float, ...]) -> Setup:

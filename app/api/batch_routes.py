@@ -15,7 +15,7 @@ from app.api.report_routes import ANSWERS, MEDIA
 from app.security import CSP_DOCUMENT
 from app.store import projects, results, scans
 from app.store.content import get_bytes
-from app.store.inputs import files_of
+from app.store.inputs import current, files_of
 from app.store.refusal import refuse
 from app.store.results import CORRECTION
 from app.store.tables import ResultRow
@@ -38,9 +38,13 @@ Chosen = Annotated[
 
 @router.get("/batch", responses=documented(404, 409, 422))
 def get_batch(ctx: Ctx, project_id: ProjectId, alignments: Chosen = []) -> dict[str, Any]:  # noqa: B006 - read only
-    """Return what serial parts have in common and what is each part's own (`batch.json`), and which alignments it is of."""
+    """Return what serial parts have in common and what is each part's own (`batch.json`), and which alignments it is of.
+
+    `patch` holds fields of the setup; it is of `setup_version` (merge it, `PUT setup` with `If-Match`), which is null where the
+    setup in force is no longer that of the plan: plan and align again first.
+    """
     numbers, result = _batch(ctx, project_id, alignments)
-    return {**result.content, "alignments": numbers}
+    return {**result.content, "alignments": numbers, "setup_version": _setup_version(ctx, project_id)}
 
 
 @router.get("/batch/report", responses=documented(404, 409, 422) | ANSWERS, response_class=Response)
@@ -84,6 +88,12 @@ def _batch(ctx: Context, project_id: str, numbers: list[int]) -> tuple[list[int]
             ctx.store.blobs.copy_to(files[file].sha256, Path(name) / file)
         loaded = load_plan(Path(name))
     return [row.number for row in rows], judge_batch(loaded, items)
+
+
+def _setup_version(ctx: Context, project_id: str) -> int | None:
+    with ctx.store.db.read() as session:
+        plan, setup = results.latest(session, project_id, "plan"), current(session, project_id, "setup")
+    return setup.version if plan is not None and plan.inputs.get("setup") == setup.sha256 else None
 
 
 def usual(rows: list[ResultRow], plan: ResultRow) -> list[ResultRow]:

@@ -76,6 +76,14 @@ def _plan(commands: "argparse._SubParsersAction[argparse.ArgumentParser]") -> No
         "--setup", type=Path, metavar="setup.json", help="the cell and the procedure; default: the paper's cell"
     )
     sub.add_argument(
+        "--patch",
+        type=Path,
+        action="append",
+        default=[],
+        metavar="patch.json",
+        help="fields of setup.json to change, as `echobase calibrate -o` and `batch` write them; again for each",
+    )
+    sub.add_argument(
         "--keypoints", type=Path, metavar="keypoints.json", help="key points in CAD mm; default: suggested"
     )
     sub.add_argument(
@@ -166,6 +174,13 @@ def _batch(commands: "argparse._SubParsersAction[argparse.ArgumentParser]") -> N
         nargs="+",
         metavar="PART",
         help="one part each: correction.json, a folder that holds it, or a scan that is aligned now",
+    )
+    sub.add_argument(
+        "-o",
+        "--output",
+        type=Path,
+        metavar="patch.json",
+        help="write the patch of setup.json here too (DIR/batch/patch.json)",
     )
     _how_aligned(sub)
 

@@ -91,6 +91,7 @@ def test_the_newest_usable_alignment_of_each_scan(project):
     along = {d["name"]: d for d in said["directions"]}
     assert abs(along["x"]["mean"] - 1.1) <= along["x"]["half_95"] * 1.5
     assert set(said["patch"]) == {"base", "fixture"}
+    assert said["setup_version"] is None  # that plan is of no setup in this store
 
 
 def test_chosen_alignments_and_what_is_left_out(project):

@@ -6,6 +6,7 @@ import shutil
 import numpy as np
 import pytest
 
+from tests.loop.analytic_scanner import matrix
 from tests.loop.chain import echobase, pose, read, six, write
 from tests.loop.surfaces import plane, write_stl
 
@@ -54,6 +55,7 @@ def test_corrections_folders_and_scans_are_told_alike(parts, capsys):
     assert all(p["simulated"] for p in content["inputs"]["parts"] if p["name"] != "second")
     for kind in ("html", "pdf", "json", "csv"):
         assert (folder / "out" / "batch" / f"report.{kind}").stat().st_size > 500
+    assert read(folder / "out" / "batch" / "patch.json") == content["patch"]
     html = (folder / "out" / "batch" / "report.html").read_text(encoding="utf-8")
     assert "4 sits 1." in html
     assert "further along y than the other 5" in html
@@ -100,3 +102,28 @@ def test_shapes_of_sprung_parts_are_compared(parts, capsys):
     assert own[[0, 2]] / shape["common_rms_mm"] == pytest.approx([0.5, 0.5], rel=0.3)
     html = (folder / "out" / "batch" / "report.html").read_text(encoding="utf-8")
     assert "The shape common to 3 parts" in html
+
+
+def test_its_patch_is_given_on_to_the_next_plan(parts, tmp_path):
+    folder, offsets = parts
+    own = tmp_path / "own.json"
+    scans = [folder / f"s{i}.csv" for i in (1, 2, 3, 5, 6)]
+    assert echobase("batch", folder / "out", *scans, "-o", own) == 0
+    patch, setup = read(own), read(folder / "setup.json")
+    assert set(patch) == {"base", "fixture"}
+    write(tmp_path / "more.json", {"fixture": {"sigma_deg": 0.9}, "standoff_mm": 21.5})
+    plan = ("plan", folder / "plate.stl", "--unit", "mm", "--setup", folder / "setup.json", "-o", tmp_path / "next")
+    assert echobase(*plan, "--patch", own, "--patch", tmp_path / "more.json") == 0
+    made = read(tmp_path / "next" / "plan.json")["setup"]
+    # BASE is where the parts were: nominal and the offset that they share.
+    moved, meant = (matrix(six(b)) for b in (made["base"], BASE))
+    meant = meant @ matrix(offsets[[0, 1, 2, 4, 5]].mean(axis=0))
+    at = np.array([75.0, 50.0, 10.0, 1.0])
+    assert np.linalg.norm((moved @ at - meant @ at)[:3]) < 0.25
+    assert np.degrees(np.arccos(moved[:3, 2] @ meant[:3, 2])) < 0.05
+    assert made["fixture"] == {**patch["fixture"], "sigma_deg": 0.9}
+    assert made["standoff_mm"] == 21.5
+    assert made["tool"]["tcp"]["z_mm"] == setup["tool"]["tcp"]["z_mm"]
+    for wrong in ([1], {"fixture": {"sigma": 1}}, {"standoff_mm": "far"}):
+        write(tmp_path / "wrong.json", wrong)
+        assert echobase(*plan, "--patch", tmp_path / "wrong.json") == 1

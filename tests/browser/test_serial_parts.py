@@ -2,7 +2,7 @@
 
 import pytest
 
-from tests.browser.eyes import Watch
+from tests.browser.eyes import Watch, until
 from tests.browser.real_server import RealServer
 
 pytestmark = [pytest.mark.browser, pytest.mark.slow, pytest.mark.timeout(600)]
@@ -29,7 +29,7 @@ def test_parts_are_compared_and_can_be_left_out(server, chromium):
     watch = Watch(server.url).on(page)
     page.goto(f"{server.url}/#/p/{pid}/alignment")
     page.get_by_role("tab", name="Batch").click()
-    table = page.locator(".drawer .batch table")
+    table = page.locator(".drawer .batch table:not(.patch)")
     table.wait_for()
     said = server.rest(f"/projects/{pid}/batch")
     assert table.locator("th").first.inner_text() == "3 parts, BASE"
@@ -52,6 +52,26 @@ def test_parts_are_compared_and_can_be_left_out(server, chromium):
     assert "2 parts cannot tell" in opened.value.content()
     page.locator("input[name='part-3']").uncheck()
     page.get_by_text("Choose two parts or more.").wait_for()
+    # What is suggested is put in force, seen to be so, and taken back, with the alignments as they were.
+    page.locator("input[name='part-2']").check()
+    page.locator("input[name='part-3']").check()
+    change = page.locator(".drawer .batch table.patch tr", has_text="fixture.sigma_mm")
+    change.wait_for()
+    before = server.rest(f"/projects/{pid}/setup")
+    assert server.rest(f"/projects/{pid}/batch")["setup_version"] == 1
+    page.get_by_role("button", name="Use in the setup").dblclick()
+    page.locator(".batch .row .tag", has_text="in force").wait_for()
+    sigma = said["patch"]["fixture"]["sigma_mm"]
+    merged = {group: before[group] | fields for group, fields in said["patch"].items()}
+    assert server.rest(f"/projects/{pid}/setup") == before | merged
+    assert [float(v) for v in change.locator("td.num").all_inner_texts()] == [before["fixture"]["sigma_mm"], sigma]
+    page.get_by_text("Its suggestion is in force now").wait_for()
+    assert server.rest(f"/projects/{pid}/alignments")[-1]["stale"] is True
+    page.locator(".drawer .batch").get_by_role("button", name="Undo").click()
+    page.locator("input[name='part-3']").wait_for()
+    until(page, lambda: not server.rest(f"/projects/{pid}/alignments")[-1]["stale"], what="the undo")
+    assert server.rest(f"/projects/{pid}/setup") == before
+    until(page, page.get_by_role("button", name="Use in the setup").is_enabled, what="the offer to use it again")
     assert watch.complaints == []
     assert watch.foreign == []
     context.close()

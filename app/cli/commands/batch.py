@@ -26,7 +26,9 @@ def run(args: argparse.Namespace) -> tuple[dict[str, Any], int]:
         say(args, f"{d['name']:<10} common {d['mean']:+z.4g} +- {d['half_95']:.3g} {d['unit']} (95 %), {scatter}")
     for part in content["parts"]:
         own = (
-            f"{k} {v['departure']:+z.3g} ({v['z']:+z.1f} sd)" for k, v in part["directions"].items() if v["z"] is not None
+            f"{k} {v['departure']:+z.3g} ({v['z']:+z.1f} sd)"
+            for k, v in part["directions"].items()
+            if v["z"] is not None
         )
         say(args, f"{part['name']:<20} " + "  ".join(own))
     shape = content["shape"]
@@ -36,6 +38,8 @@ def run(args: argparse.Namespace) -> tuple[dict[str, Any], int]:
     if content["patch"]:
         say(args, f"patch      {content['patch']}")
     say_issues(args, list(result.issues))
+    if args.output is not None:
+        write_artifacts(args.output.parent, {args.output.name: result.artifacts["batch/patch.json"]})
     say(args, f"written to {args.directory}/batch.json and {args.directory}/batch")
     return {"ok": True, "files": sorted(result.artifacts), **content}, DONE
 

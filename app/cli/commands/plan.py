@@ -6,7 +6,7 @@ from typing import Any
 from app import workflow
 from app.cli.run import DONE, FAILED, progress_printer, say, say_issues
 from app.folder import clear_programs, write_artifacts
-from app.inputs import read_keypoints, read_setup, with_box
+from app.inputs import patched, read_keypoints, read_setup, with_box
 from planner.errors import fail
 from planner.issues import errors_in
 
@@ -15,7 +15,7 @@ def run(args: argparse.Namespace) -> tuple[dict[str, Any], int]:
     """Plan both paths, write both programs; fail if either could not be written."""
     if not args.part.is_file():
         raise fail("file-missing", f"there is no file '{args.part.name}'.", "Check the path.", str(args.part))
-    setup = read_setup(args.setup)
+    setup = patched(read_setup(args.setup), args.patch)
     if args.box is not None:
         setup = with_box(setup, args.box)
     keypoints = tuple(read_keypoints(args.keypoints)) if args.keypoints else ()

@@ -1,10 +1,12 @@
 // Serial parts on one fixture: what their alignments have in common, and what is each part's own.
 
-import { API, get } from "../api.js";
+import { API, etagOf, get } from "../api.js";
 import { fill, h } from "../dom.js";
 import { fixed } from "../format.js";
 import { issueList, tag } from "../status.js";
+import { patchOf } from "./patch.js";
 
+const WORDS = { nothing: "Nothing to change in the cell.", stale: "The cell was changed since the plan. Plan, then align again.", key: "batch" };
 const PLACES = { mm: 3, deg: 4, sigma: 2 };
 const SVG = "http://www.w3.org/2000/svg";
 const signed = (v, places) => (Number.isFinite(v) && Number(v.toFixed(places)) > 0 ? "+" : "") + fixed(v, places);
@@ -16,25 +18,41 @@ export function candidates(all) {
   return [...newest.values()].sort((a, b) => a.number - b.number);
 }
 
-/** Draw the table of a batch; `chosen` is a Set of alignment numbers that the check boxes change, `path` the project's. */
-export async function batch(body, alive, path, list, chosen) {
-  const numbers = list.map((a) => a.number).filter((n) => chosen.has(n));
-  const query = numbers.map((n) => `alignments=${n}`).join("&");
-  let found = null;
+/** Draw the table of a batch of the alignments in `list`; `local.chosen` is a Set of their numbers that the check boxes change. */
+export async function batch(body, alive, shell, list, local) {
+  const { path, data } = shell.project;
+  const numbers = list.map((a) => a.number).filter((n) => local.chosen.has(n));
   let refusal = "";
-  if (numbers.length > 1) {
-    try { found = await get(`${path}/batch?${query}`); } catch (error) { refusal = error.message; }
+  // Once its patch is in force, the alignments are of the cell before: what was shown then stays, to be taken back.
+  const used = inForce(shell, local);
+  let found = used ? local.found : null;
+  if (!used && numbers.length > 1) {
+    try { found = await get(`${path}/batch?${numbers.map((n) => `alignments=${n}`).join("&")}`); } catch (error) { refusal = error.message; }
   }
   if (!alive()) return;
-  const again = () => batch(body, alive, path, list, chosen);
-  const toggle = (n) => { if (!chosen.delete(n)) chosen.add(n); again(); };
+  if (found && !used) remember(local, found, etagOf(`${path}/setup`) === `"${found.setup_version}"` ? JSON.stringify(data.setup) : null);
+  const again = () => { if (shell.step === "alignment") shell.drawer.draw(); };
+  const toggle = (n) => { if (!local.chosen.delete(n)) local.chosen.add(n); again(); };
   const boxes = h("div", { class: "row tight" }, h("span", { class: "soft small" }, "Parts:"), list.map((a) => h("label", { class: "row tight" },
-    h("input", { type: "checkbox", name: `part-${a.number}`, checked: chosen.has(a.number), onchange: () => toggle(a.number) }), `Alignment ${a.number}`)));
+    h("input", { type: "checkbox", name: `part-${a.number}`, checked: local.chosen.has(a.number), onchange: () => toggle(a.number) }), `Alignment ${a.number}`)));
+  const query = (found?.alignments ?? []).map((n) => `alignments=${n}`).join("&");
   const link = (format, word) => h("a", { href: `${API}${path}/batch/report?${query}&format=${format}${format === "html" ? "" : "&download=true"}`, target: "_blank", rel: "noopener", "aria-label": `Report of the batch: ${word}` }, word);
-  fill(body, h("div", { class: "batch stack" }, boxes,
-    found ? [notes(found, true).map((i) => h("p", { class: "small" }, tag("warn", i.message))), table(found), h("div", { class: "row" }, h("span", { class: "soft small" }, "Report:"), link("html", "open"), link("pdf", "PDF"), link("csv", "CSV"), link("json", "JSON")), advice(found.patch), issueList(notes(found, false), 6)]
+  const links = h("div", { class: "row" }, h("span", { class: "soft small" }, "Report:"), link("html", "open"), link("pdf", "PDF"), link("csv", "CSV"), link("json", "JSON"));
+  fill(body, h("div", { class: "batch stack" }, used ? h("p", { class: "small" }, tag("warn", "Its suggestion is in force now: plan again. The alignments are of the cell before.")) : boxes,
+    found ? [notes(found, true).map((i) => h("p", { class: "small" }, tag("warn", i.message))), table(found), links, h("div", { class: "advice stack" }, h("h3", {}, "Suggested for the cell"), patchOf(shell, local.use, WORDS, again)), issueList(notes(found, false), 6)]
       : h("p", { class: "nothing" }, refusal || "Choose two parts or more.")));
 }
+
+/** Keep what a batch suggests, and whether it was used, for as long as it suggests the same. */
+function remember(local, found, madeFor) {
+  const key = JSON.stringify([found.alignments, found.patch]);
+  if (local.key !== key) Object.assign(local, { key, use: { patch: found.patch, madeFor: null, saving: false } });
+  local.found = found;
+  local.use.madeFor = madeFor;
+}
+
+/** True as long as the setup is the one that the button of this tab made. */
+export const inForce = (shell, local) => Boolean(local?.use?.mine) && local.use.mine === JSON.stringify(shell.project.data.setup);
 
 /** What to know before reading the table, and what else there is to say. */
 const notes = (found, pressing) => found.issues.filter((i) => (i.severity !== "info") === pressing);
@@ -75,13 +93,4 @@ function strip([low, high], d, v) {
     make("line", { class: "whisker", x1: x(v.value - 1.96 * v.sigma), x2: x(v.value + 1.96 * v.sigma), y1: HIGH / 2, y2: HIGH / 2 }),
     make("circle", { class: v.odd ? "dot odd" : "dot", cx: x(v.value), cy: HIGH / 2, r: 2.6 }));
   return picture;
-}
-
-/** What to write into the cell's settings, in words. */
-function advice(patch) {
-  const said = [];
-  if (patch.base) said.push(`BASE ${["x_mm", "y_mm", "z_mm", "a_deg", "b_deg", "c_deg"].map((k) => `${k[0].toUpperCase()} ${fixed(patch.base[k], k.endsWith("mm") ? 3 : 4)}`).join(" ")}`);
-  if (patch.fixture?.sigma_mm !== undefined) said.push(`fixture sigma ${fixed(patch.fixture.sigma_mm, 3)} mm`);
-  if (patch.fixture?.sigma_deg !== undefined) said.push(`fixture sigma ${fixed(patch.fixture.sigma_deg, 4)} deg`);
-  return h("p", { class: "small" }, said.length ? `Suggested for the cell: ${said.join("; ")}.` : "Nothing to change in the cell.");
 }

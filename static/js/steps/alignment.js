@@ -3,7 +3,7 @@
 import { API, get, post } from "../api.js";
 import { askAcceptance } from "../dialog.js";
 import { button, h } from "../dom.js";
-import { batch, candidates } from "../drawer/batch.js";
+import { batch, candidates, inForce } from "../drawer/batch.js";
 import { drawing } from "../drawer/figure.js";
 import { histograms } from "../drawer/plots.js";
 import { directions, matches, runs } from "../drawer/tables.js";
@@ -142,24 +142,30 @@ export async function accept(shell, a) {
 }
 
 /** Which alignments are compared as serial parts: all, until somebody unticks one; new ones come ticked. */
-function chosenParts(shell, parts) {
+function batchOf(shell, parts) {
   const local = (shell.local.batch ??= { known: new Set(), chosen: new Set() });
   for (const { number } of parts) if (!local.known.has(number)) { local.known.add(number); local.chosen.add(number); }
-  return local.chosen;
+  return local;
+}
+
+/** Take back what the tab Batch put in force. */
+export function undo(shell) {
+  if (inForce(shell, shell.local.batch)) shell.do(() => shell.project.undoSetup());
 }
 
 export function drawer(shell) {
   const { alignment: a, alignments: all = [] } = shell.project.data;
   if (!a) return { tabs: [], stamp: "" };
   const parts = candidates(all);
+  const serial = batchOf(shell, parts);
   const path = (n, name) => `${shell.project.path}/alignments/${n}/figures/${name}`;
-  return { stamp: `${a.number} ${a.stale} ${all.length}`, tabs: [
+  return { stamp: `${a.number} ${a.stale} ${all.length} ${inForce(shell, serial)}`, tabs: [
     { key: "histogram", title: "Before and after", draw: async (body, alive) => histograms(body, alive, await get(`${shell.project.path}/charts/deviation`)) },
     ...(a.prediction?.after ? [{ key: "inspection", title: "Predicted inspection", draw: (body, alive) => drawing(body, alive, path(a.number, "inspection")) }] : []),
     ...(a.non_rigid?.field_rms_mm != null ? [{ key: "shape", title: "Shape of the part", draw: (body, alive) => drawing(body, alive, path(a.number, "shape")) }] : []),
     { key: "points", title: "Key points", draw: (body) => matches(body, a.keypoints, (id) => shell.view.send({ focus: id })) },
     { key: "directions", title: "Directions", draw: (body) => directions(body, a.directions) },
     ...(all.length > 1 ? [{ key: "runs", title: "All alignments", draw: (body) => runs(body, all, (n) => `${API}${shell.project.path}/alignments/${n}/report`) }] : []),
-    ...(parts.length > 1 ? [{ key: "batch", title: "Batch", draw: (body, alive) => batch(body, alive, shell.project.path, parts, chosenParts(shell, parts)) }] : []),
+    ...(parts.length > 1 || inForce(shell, serial) ? [{ key: "batch", title: "Batch", draw: (body, alive) => batch(body, alive, shell, parts, serial) }] : []),
   ] };
 }
