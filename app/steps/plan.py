@@ -16,6 +16,7 @@ from planner.checks import check
 from planner.checks.left import left_issues
 from planner.checks.orientation import orientation_issues
 from planner.checks.regions import region_issues
+from planner.checks.sound import sound_raster
 from planner.checks.tessellation import tessellation_issues
 from planner.errors import EchoBaseError
 from planner.issues import Issue, errors_in
@@ -25,7 +26,6 @@ from planner.path.alignment import alignment_path
 from planner.path.coverage import Coverage, coverage
 from planner.path.decimate import decimate
 from planner.path.keypoints import kept_out, snap, suggest, verdicts
-from planner.path.raster import raster
 from planner.setup import Setup
 from planner.surface.choose import chosen_surface, clip_issues
 from planner.surface.curved import CurvedSurface, footprint_mm
@@ -78,7 +78,8 @@ def run_plan(request: PlanRequest, progress: Progress) -> tuple[Plan, Artifacts]
     progress(0.5, "laying the alignment path")
     alignment = alignment_path(curved, keypoints, setup)
     progress(0.6, "laying the inspection raster")
-    inspection = raster(curved, setup)
+    inspection, left_out = sound_raster(curved, setup)
+    issues += left_out
     progress(0.7, "measuring coverage")
     covered = {p.kind: coverage(curved, p, setup) for p in (alignment, inspection)}
     issues += left_issues(curved, covered["inspection"], setup)

@@ -41,6 +41,11 @@ def raster(curved: CurvedSurface, setup: Setup) -> ToolPath:
     each carries its triangle and barycentric coordinates, and normals are those of `curved` at that very point.
     Raises `EchoBaseError` if the surface leaves no room or the raster would be unreasonably dense.
     """
+    return raster_and_edges(curved, setup)[0]
+
+
+def raster_and_edges(curved: CurvedSurface, setup: Setup) -> tuple[ToolPath, int]:
+    """Return the path of `raster`, and how many of its passes come before those along edges."""
     surface, inspection = curved.surface, setup.inspection
     axes = raster_axes(curved, setup)
     mesh = PathMesh.of(surface)
@@ -69,12 +74,13 @@ def raster(curved: CurvedSurface, setup: Setup) -> ToolPath:
     track = _in_order(track, axes)
     data = _data(curved, cut, track, spacing)
     path = assemble(data, "inspection", setup.standoff_mm, spacing)
+    passes = path.passes
     left = left_by(path, curved, setup)
     if left is not None:
         more = _along_edges(curved, left, path, setup, spacing)
         if more is not None:
             path = assemble(joined(data, more), "inspection", setup.standoff_mm, spacing)
-    return with_links(path, curved, setup)
+    return with_links(path, curved, setup), passes
 
 
 def _along_edges(curved: CurvedSurface, left: Left, path: ToolPath, setup: Setup, spacing: float) -> DataRuns | None:
