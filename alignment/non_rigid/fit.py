@@ -93,15 +93,14 @@ def fit_field(
     cv, cv_rigid = _foretold(few, evidence)
     if evidence.gain < LEAST_GAIN:
         return nothing("what is left after the rigid alignment is explained by noise", evidence)
+    large = float(np.abs(rows.r[used]).max()) > MUCH * setup.tolerances.position_mm
     if cv >= cv_rigid:
-        large = float(np.abs(rows.r[used]).max()) > MUCH * setup.tolerances.position_mm
-        reason = "its passes lie too far apart to foretell each other"
-        return nothing(reason, evidence, large)
+        return nothing("the passes lie too far apart to foretell each other", evidence, large)
     around = samples_of(curved)
     carry = _Carrier(curved, setup, patches, evidence.theta, evidence.axes, around)
     field = carry.field(rows, used, T_base_part, None)
     if field.support is None or field.support.share < LEAST_SUPPORT:
-        return nothing("the readings determine a deformation hardly anywhere on the surface", evidence)
+        return nothing("the readings determine a deformation hardly anywhere on the surface", evidence, large)
     xi = rigid_part(field, around, T_base_part, tuple(directions))
     T = moved(T_base_part, xi, problem.centre_mm(T_base_part))
     rows = patch_rows(patches, curved, T, problem.centre_mm(T))

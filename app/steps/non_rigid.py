@@ -11,6 +11,7 @@ from alignment.correction import Correction
 from alignment.estimate.align import residual_of
 from alignment.estimate.verdict import limit_issues, nominal_shift, residual_issues, verdict_of
 from alignment.metrics import Expected, expected
+from alignment.metrics.figures import WITHIN_DB
 from alignment.non_rigid import Field, FieldFit, SprungSurface, fit_field
 from app.plan import Plan
 from planner.checks import check
@@ -62,6 +63,8 @@ def follow(plan: Plan, cloud: PointCloud, found: Correction, adapt_poses: bool) 
     if fit.field is None:
         if adapt_poses:
             found = _refused(found, fit)
+        elif fit.seen:
+            found = replace(found, issues=(*found.issues, unfollowed(fit)))
         return _rigid(plan, found, plan.curved, T, None)
     if adapt_poses:
         return _adapted(plan, found, fit, fit.field)
@@ -124,18 +127,43 @@ def _keyed(
 
 
 def _doubted(plan: Plan, seen: Expected, field: Field | None) -> Expected:
-    """Return what is seen, with the field's own standard deviation in the spread of the standoff of its summary."""
+    """Return what is seen, with the field's own standard deviations in its summary: of standoff, and of slope.
+
+    A slope known to s (of each of two directions) adds k s^2 per axis to the loss that is to be expected.
+    """
     if field is None or field.support is None:
         return seen
     poses = plan.inspection.take(plan.inspection.is_data)
-    doubt = field.support.sigma_mm[field.support.nearest(poses.Ts_part_contact.xyz_mm)]
+    at = field.support.nearest(poses.Ts_part_contact.xyz_mm)
     on = seen.on_part & np.isfinite(seen.distance_mm)
     if not on.any():
         return seen
-    d, s = seen.distance_mm[on], doubt[on]
-    std = float(np.hypot(seen.summary.tof_std_mm, np.sqrt(np.mean(s**2))))
-    summary = replace(seen.summary, tof_std_mm=std, tof_range_mm=float((d + s).max() - (d - s).min()))
+    d, s = seen.distance_mm[on], field.support.sigma_mm[at][on]
+    slope_deg = np.degrees(field.support.slope_rad[at][on])
+    loss = plan.setup.probe.tilt_loss_db_per_deg2
+    db = seen.db[on] - (loss.b + loss.c) * slope_deg**2
+    summary = replace(
+        seen.summary,
+        tof_std_mm=float(np.hypot(seen.summary.tof_std_mm, np.sqrt(np.mean(s**2)))),
+        tof_range_mm=float((d + s).max() - (d - s).min()),
+        tilt_max_deg=float(np.hypot(seen.tilt_deg[on], slope_deg).max()),
+        within_2db=float((db >= -WITHIN_DB).mean()),
+        mean_abs_db=float(np.abs(db).mean()),
+    )
     return replace(seen, summary=summary)
+
+
+def unfollowed(fit: FieldFit) -> Issue:
+    """Return what to say of a shape that single passes show and no other pass foretells: a dent between two of them."""
+    largest = float(np.abs(fit.rows.r[fit.used]).max())
+    return Issue(
+        "warning",
+        "sprung-back-unfollowed",
+        f"the part differs smoothly from its CAD, by up to {largest:.2f} mm where it was scanned, but {fit.reason}: the "
+        "prediction after the correction leaves it out.",
+        "Scan with passes closer together (the inspection path itself will do), and align as non-rigid.",
+        "scan",
+    )
 
 
 def _refused(found: Correction, fit: FieldFit) -> Correction:
@@ -146,6 +174,8 @@ def _refused(found: Correction, fit: FieldFit) -> Correction:
         "The rigid correction stands; scan more passes if the part is known to have sprung back.",
         "scan",
     )
+    if fit.seen:
+        issue = unfollowed(fit)
     record = {"applied": False, "reason": fit.reason, "evidence": fit.gain}
     return replace(found, non_rigid=record, issues=(*found.issues, issue))
 

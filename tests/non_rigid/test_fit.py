@@ -3,6 +3,7 @@
 import numpy as np
 import pytest
 
+from app.steps.non_rigid import unfollowed
 from tests.non_rigid import cases
 from tests.non_rigid.cases import CYLINDER, PLATE, inspect, measured, spread
 
@@ -88,6 +89,23 @@ def test_half_of_the_part_unscanned_falls_back_to_rigid_there():
     after = inspect(CYLINDER, cases.dent, curved, fit.T_base_part, fit.field)
     assert spread(after)[0] < spread(before)[0]
     assert after.tilt_deg.max() < before.tilt_deg.max()
+
+
+@pytest.mark.parametrize(("width_mm", "word"), [(20.0, "foretell"), (12.0, "hardly anywhere")])
+def test_a_dent_under_a_single_pass_is_not_followed_and_not_called_noise(width_mm, word):
+    def small(p, part):
+        x, y = part.unit(p)
+        return -0.6 * np.exp(-((x * 150 - 30) ** 2) / (2 * 30.0**2) - (y * part.half_mm + 30) ** 2 / (2 * width_mm**2))
+
+    fit, rigid, _ = measured(CYLINDER, small)
+    assert fit.field is None
+    assert fit.seen
+    assert word in fit.reason
+    assert np.array_equal(fit.T_base_part.matrix, rigid.matrix)
+    issue = unfollowed(fit)
+    assert (issue.severity, issue.code) == ("warning", "sprung-back-unfollowed")
+    assert word in issue.message
+    assert not measured(CYLINDER, cases.nothing)[0].seen
 
 
 @pytest.mark.parametrize("passes", [1, 2])
