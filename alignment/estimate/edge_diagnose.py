@@ -9,23 +9,19 @@ from typing import Any
 import numpy as np
 
 from alignment.cloud import PointCloud
+from alignment.estimate.edge_report import LEAST_CROSSINGS, few_agree, off_edges
 from alignment.estimate.hypotheses import Hypothesis
 from alignment.estimate.map import MapFit, align_map
 from alignment.estimate.problem import Problem
 from planner.issues import Issue
 from planner.setup import Setup
 
-# No robot and no beam leaves crossings this far (rms, mm) off the edges of a part that is as its CAD.
-OFF_EDGES_MM = 0.5
-# With fewer of the crossings on their edges than this, something is wrong with more than a few.
-LEAST_AGREE = 0.7
 # A crossing that belongs to no edge counts as this far off (mm).
 UNMATCHED_MM = 0.5
 # Crossings that lie farther off than this, all in all (rms, mm), are worth a look for what would explain them.
 SUSPICIOUS_MM = 0.1
-# Another order of laws has to leave less than this share of it, and so many crossings have to speak.
+# Another order of laws has to leave less than this share of it.
 BETTER = 0.5
-LEAST_CROSSINGS = 20
 
 
 # Edges seen this much late or early (mm), and by so many standard deviations, are worth a word.
@@ -56,13 +52,12 @@ def _late(edges: dict[str, Any], setup: Setup) -> list[Issue]:
 
 
 def _off(edges: dict[str, Any]) -> list[Issue]:
-    off_mm, used, crossings = edges["rms_mm"], edges["used"], edges["crossings"]
-    if off_mm > OFF_EDGES_MM:
-        what = f"at this placement the crossings lie {off_mm:.2f} mm rms off the CAD's edges"
-    elif crossings >= LEAST_CROSSINGS and used < LEAST_AGREE * crossings:
-        what = f"only {used} of {crossings} crossings lie on the CAD's edges at this placement"
-    else:
+    if not off_edges(edges):
         return []
+    if few_agree(edges):
+        what = f"only {edges['used']} of {edges['crossings']} crossings lie on the CAD's edges at this placement"
+    else:
+        what = f"at this placement the crossings lie {edges['rms_mm']:.2f} mm rms off the CAD's edges"
     why = "the part has sprung back or is trimmed otherwise, something lies on it, or the laws of the scan are not as said"
     remedy = (
         "Look where they lie off; if the part has sprung back, run the alignment as non-rigid: it stays on the edges."

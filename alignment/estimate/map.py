@@ -13,6 +13,7 @@ from alignment.estimate.directions import Direction, directions, held_basis
 from alignment.estimate.edge_curve import locate
 from alignment.estimate.edge_gain import tilt_loss_db
 from alignment.estimate.edge_points import edge_points
+from alignment.estimate.edge_report import edge_report, off_edges
 from alignment.estimate.edge_rows import EdgeMap
 from alignment.estimate.locks import LockStrain, lock_strain
 from alignment.estimate.mixture import Mixture, Posterior, mixture, solve, tail_scale
@@ -22,7 +23,7 @@ from alignment.estimate.pose_line import PoseLine, pose_line
 from alignment.estimate.problem import Problem
 from alignment.estimate.robust_fit import robust_fit
 from alignment.estimate.surface_rows import Rows, same_afresh
-from alignment.estimate.system import BIAS_SHARE, EdgeData, System, nuisance_columns
+from alignment.estimate.system import BIAS_SHARE, EdgeData, System
 from planner.frames import Array, Transform
 from planner.setup import Setup
 from planner.surface.boundary import boundary
@@ -102,7 +103,11 @@ def align_map(
         strict = replace(patches, follower=Follower(curved))
         patches = strict
         found = fit_captured(problem, captured, strict, crossed, stay_on_edges)
-    if crossed is not None and isinstance(found, MapFit) and _shape_mm(found) > MUCH_WORSE * SHAPE_MM:
+    if (
+        crossed is not None
+        and isinstance(found, MapFit)
+        and (_shape_mm(found) > MUCH_WORSE * SHAPE_MM or off_edges(found.edges))
+    ):
         # A slide along the shape of a part that sprang back and a late clock explain each other: then the clock is right.
         found = fit_captured(problem, captured, patches, crossed.as_said(), stay_on_edges, sprung=True)
     return found
@@ -171,9 +176,10 @@ def fit_captured(
         covariance = covariance + np.outer(apart, apart)
     found = directions(covariance, held, problem.lock_rows(T), scale, problem.moments_base(T), setup.tolerances)
     now = system.surface(T)
+    of_edges = edge_report(system, T, state.nuisance, post.covariance)
     return MapFit(
         T, problem.centre_mm(T), covariance * np.outer(scale, scale), found, patches, now, robust.used & now.valid,
-        noise, captured, robust.settled and converged, _edge_report(state, system, post), strain,
+        noise, captured, robust.settled and converged, of_edges, strain,
     )  # fmt: skip
 
 
@@ -261,33 +267,3 @@ def _rms_mm(system: System, T_base_part: Transform) -> float:
     rows = system.surface(T_base_part)
     used = system.used & rows.valid
     return float(np.sqrt(np.average(rows.r[used] ** 2, weights=system.patches.count[used]))) if used.any() else np.inf
-
-
-def _edge_rms_mm(system: System, T_base_part: Transform, nuisance: Array) -> float:
-    """Return how far the crossings lie off their edges, bias, lag and tilt taken off (rms, mm); 0 without any."""
-    if system.edges is None or not system.edges.used.any():
-        return 0.0
-    found = system.edges.rows(system.problem, T_base_part)
-    left = found.r + nuisance_columns(system.edges, found) @ nuisance
-    return float(np.sqrt(np.mean(left[system.edges.used] ** 2)))
-
-
-def _edge_report(state: State, system: System, post: Posterior) -> dict[str, Any] | None:
-    if system.edges is None:
-        return None
-    used = system.edges.used
-    to_mm = np.array([system.edges.bias_sigma_mm, system.edges.lag_sigma_mm])
-    # What bias and lag come to together is known even where every edge was crossed outwards and they cannot be told apart.
-    both = post.covariance[6:8, 6:8] * np.outer(to_mm, to_mm)
-    bias, lag = state.nuisance[:2] * to_mm
-    return {
-        "crossings": len(used),
-        "used": int(used.sum()),
-        "rms_mm": _edge_rms_mm(system, state.T_base_part, state.nuisance),
-        "bias_mm": float(bias),
-        "bias_sigma_mm": float(np.sqrt(both[0, 0])),
-        "lag_mm": float(lag),
-        "lag_sigma_mm": float(np.sqrt(both[1, 1])),
-        "late_mm": float(bias + lag),
-        "late_sigma_mm": float(np.sqrt(both.sum())),
-    }
