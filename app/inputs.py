@@ -12,6 +12,8 @@ from planner.issues import Issue
 from planner.keypoint import KeyPoint, KeyPointList
 from planner.setup import Setup
 
+# What pydantic calls a value that should have been an object.
+NO_OBJECT = ("model_type", "model_attributes_type", "dict_type")
 MAX_JSON_BYTES = 16 * 1024 * 1024
 
 
@@ -22,12 +24,26 @@ def read_json(path: Path) -> Any:
     if path.stat().st_size > MAX_JSON_BYTES:
         raise fail("file-too-large", "the file is over 16 MiB, far more than settings need.", "", path.name)
     try:
-        return json.loads(path.read_text(encoding="utf-8-sig"))
+        return json.loads(path.read_text(encoding="utf-8-sig"), object_pairs_hook=_once)
+    except _TwiceError as error:
+        raise fail("key-twice", f"'{error}' stands twice in one object.", "Keep one of them.", path.name) from error
     except UnicodeDecodeError as error:
         raise fail("not-text", "the file is not UTF-8 text.", "Save it as JSON text.", path.name) from error
     except json.JSONDecodeError as error:
         where = f"{path.name}:{error.lineno}:{error.colno}"
         raise fail("not-json", f"this is not valid JSON: {error.msg}.", "Correct it there.", where) from error
+
+
+class _TwiceError(ValueError):
+    """A name that an object of JSON has twice, of which one would count silently."""
+
+
+def _once(pairs: list[tuple[str, Any]]) -> dict[str, Any]:
+    out = dict(pairs)
+    if len(out) < len(pairs):
+        names = [name for name, _ in pairs]
+        raise _TwiceError(next(n for n in names if names.count(n) > 1))
+    return out
 
 
 def setup_from(data: Any, where: str = "setup.json") -> Setup:
@@ -102,7 +118,8 @@ def _field_issue(error: dict[str, Any], where: str, model: type[BaseModel]) -> I
         known = ", ".join(_siblings(error["loc"], model))
         remedy = f"Correct the name or remove it; known here: {known}." if known else "Correct the name or remove it."
         return Issue("error", "field-unknown", f"there is no setting '{place}'.", remedy, where)
-    message = str(error["msg"]).removeprefix("Value error, ")
+    message = "an object with its fields in { } is needed" if kind in NO_OBJECT else str(error["msg"])
+    message = message.removeprefix("Value error, ")
     value = error.get("input")
     shown = f" (it is {json.dumps(value)})" if isinstance(value, str | int | float | bool) or value is None else ""
     return Issue("error", "field-invalid", f"{place}{shown}: {message[:1].lower()}{message[1:]}.", "", where)

@@ -9,7 +9,7 @@ from pydantic import Field, model_validator
 
 from planner.frames import Frame, Transform
 from planner.shapes import Box, Brush, KeepOut
-from planner.strict import Deg, Mm, NonNegativeMm, PositiveMm, Strict, Xyz
+from planner.strict import Deg, Mm, NonNegativeMm, PositiveMm, Real, Strict, Whole, Xyz
 
 __all__ = [
     "Alignment",
@@ -66,30 +66,30 @@ class Pose(Strict):
 class TiltLoss(Strict):
     """Quadratic amplitude loss k alpha^2 (dB, alpha in deg) per axis; fitted by a tilt calibration."""
 
-    b: float = Field(2.0, ge=0.0, le=100.0)
+    b: Real = Field(2.0, ge=0.0, le=100.0)
     """Loss per deg^2 for a turn B about the TCP y axis, which tilts the array axis (dB/deg^2)."""
-    c: float = Field(1.0, ge=0.0, le=100.0)
+    c: Real = Field(1.0, ge=0.0, le=100.0)
     """Loss per deg^2 for a turn C about the TCP x axis, the array axis (dB/deg^2)."""
 
 
 class Probe(Strict):
     """The ultrasonic probe: a linear array, or a single crystal (`elements` 1)."""
 
-    elements: int = Field(64, ge=1, le=4096)
+    elements: Whole = Field(64, ge=1, le=4096)
     """Number of elements."""
-    pitch_mm: float = Field(0.6, gt=0.0, le=50.0)
+    pitch_mm: Real = Field(0.6, gt=0.0, le=50.0)
     """Element pitch (mm)."""
-    aperture_elements: int = Field(15, ge=1, le=4096)
+    aperture_elements: Whole = Field(15, ge=1, le=4096)
     """Elements of one focal law's aperture."""
-    frequency_mhz: float = Field(5.0, gt=0.0, le=200.0)
+    frequency_mhz: Real = Field(5.0, gt=0.0, le=200.0)
     """Centre frequency (MHz)."""
-    elevation_mm: float = Field(9.0, gt=0.0, le=200.0)
+    elevation_mm: Real = Field(9.0, gt=0.0, le=200.0)
     """Element length across the array (mm)."""
-    beam_width_mm: float = Field(3.0, gt=0.0, le=100.0)
+    beam_width_mm: Real = Field(3.0, gt=0.0, le=100.0)
     """-6 dB beam width at the standoff (mm)."""
     reversed: bool = False
     """Law 1 at the positive end of the array axis."""
-    face_offset_mm: float = Field(0.0, ge=-500.0, le=500.0)
+    face_offset_mm: Real = Field(0.0, ge=-500.0, le=500.0)
     """How far the law origins lie behind the TCP along the beam (mm)."""
     tilt_loss_db_per_deg2: TiltLoss = TiltLoss()
 
@@ -113,27 +113,27 @@ class Probe(Strict):
 class Couplant(Strict):
     """Water (or what carries the sound) between probe and part."""
 
-    temperature_c: float = Field(20.0, ge=0.0, le=95.0)
+    temperature_c: Real = Field(20.0, ge=0.0, le=95.0)
     """Couplant temperature (deg C)."""
-    sound_speed_m_s: float | None = Field(None, ge=300.0, le=7000.0)
+    sound_speed_m_s: Real | None = Field(None, ge=300.0, le=7000.0)
     """Measured speed of sound (m/s); null: of pure water at the temperature (Marczak 1997)."""
-    delay_us: float = Field(0.0, ge=-1000.0, le=1000.0)
+    delay_us: Real = Field(0.0, ge=-1000.0, le=1000.0)
     """Constant two-way delay to subtract from every time of flight (us)."""
 
 
 class Signals(Strict):
     """Digital signals between robot and acquisition."""
 
-    data_output: int | None = Field(1, ge=1, le=8192)
+    data_output: Whole | None = Field(1, ge=1, le=8192)
     """$OUT that is TRUE while data are taken; null: none."""
-    wait_input: int | None = Field(None, ge=1, le=8192)
+    wait_input: Whole | None = Field(None, ge=1, le=8192)
     """$IN to wait for before each pass; null: none."""
 
 
 class Tool(Strict):
     """The tool as taught on the controller, and the envelope of its nozzle."""
 
-    number: int = Field(1, ge=1, le=32)
+    number: Whole = Field(1, ge=1, le=32)
     """TOOL_DATA index."""
     beam_axis: Literal["x", "y", "z", "-x", "-y", "-z"] = "z"
     """Axis of the taught tool along which the beam leaves."""
@@ -154,9 +154,9 @@ class Tool(Strict):
 class Base(Pose):
     """Nominal $BASE: T_world_base, the numbers of BASE_DATA[number]. All zeros: an untaught base."""
 
-    number: int = Field(1, ge=1, le=32)
+    number: Whole = Field(1, ge=1, le=32)
     """BASE_DATA index."""
-    corrected_number: int | None = Field(None, ge=1, le=32)
+    corrected_number: Whole | None = Field(None, ge=1, le=32)
     """BASE_DATA index of the corrected base; null: the same."""
 
     @property
@@ -168,46 +168,46 @@ class Base(Pose):
 class Fixture(Strict):
     """Prior of the part's placement: independent normal deviations per axis of base, about the surface centroid."""
 
-    sigma_mm: float = Field(2.0, gt=0.0, le=1000.0)
+    sigma_mm: Real = Field(2.0, gt=0.0, le=1000.0)
     """Standard deviation of each displacement (mm)."""
-    sigma_deg: float = Field(0.5, gt=0.0, le=45.0)
+    sigma_deg: Real = Field(0.5, gt=0.0, le=45.0)
     """Standard deviation of each rotation (deg)."""
 
 
 class Tolerances(Strict):
     """What the inspection procedure accepts."""
 
-    tilt_deg: float = Field(1.0, gt=0.0, le=45.0)
+    tilt_deg: Real = Field(1.0, gt=0.0, le=45.0)
     """Largest angle between beam and surface normal (deg)."""
-    loss_db: float = Field(2.0, gt=0.0, le=60.0)
+    loss_db: Real = Field(2.0, gt=0.0, le=60.0)
     """Largest amplitude change from the reference (dB)."""
-    standoff_mm: float = Field(1.5, gt=0.0, le=100.0)
+    standoff_mm: Real = Field(1.5, gt=0.0, le=100.0)
     """Largest standoff error (mm)."""
-    position_mm: float = Field(0.1, gt=0.0, le=100.0)
+    position_mm: Real = Field(0.1, gt=0.0, le=100.0)
     """One-sigma motion of the surface up to which a direction counts as measured (mm)."""
-    angle_deg: float = Field(0.05, gt=0.0, le=45.0)
+    angle_deg: Real = Field(0.05, gt=0.0, le=45.0)
     """One-sigma turn of the surface up to which a direction counts as measured (deg)."""
 
 
 class Alignment(Strict):
     """The alignment scan and its evaluation."""
 
-    coverage: float = Field(0.25, gt=0.0, le=1.0)
+    coverage: Real = Field(0.25, gt=0.0, le=1.0)
     """Share of the inspection surface that a suggested alignment scan covers."""
-    standoff_mm: float | None = Field(None, gt=0.0, le=1000.0)
+    standoff_mm: Real | None = Field(None, gt=0.0, le=1000.0)
     """Standoff of the alignment scan (mm); null: the inspection's."""
-    scan_speed_mm_s: float = Field(50.0, gt=0.0, le=2000.0)
+    scan_speed_mm_s: Real = Field(50.0, gt=0.0, le=2000.0)
     edges: bool = True
     """Let the alignment scan cross free edges."""
-    edge_overrun_mm: float = Field(8.0, ge=0.0, le=200.0)
+    edge_overrun_mm: Real = Field(8.0, ge=0.0, le=200.0)
     """How far the alignment scan runs past a free edge (mm)."""
     point_model: Literal["perpendicular", "axial"] = "perpendicular"
     """Where an echo puts its point: along the surface normal, or along the beam."""
     search_radius_mm: PositiveMm = 10.0
     """Radius around a key point in which readings are used (mm)."""
-    min_amplitude_pct: float = Field(20.0, ge=0.0, le=1000.0)
+    min_amplitude_pct: Real = Field(20.0, ge=0.0, le=1000.0)
     """Key points whose mean amplitude is below this are rejected (%FSH)."""
-    min_normal_dot: float = Field(0.98, ge=0.0, le=1.0)
+    min_normal_dot: Real = Field(0.98, ge=0.0, le=1.0)
     """Key points whose fitted plane turns from the CAD normal by more than its arc cosine are rejected."""
     lock: tuple[Dof, ...] = ()
     """Degrees of freedom to keep at their nominal value."""
@@ -224,15 +224,15 @@ class Inspection(Strict):
     """Turn of the passes about the mean normal, from `direction` (deg)."""
     guide: Annotated[tuple[Xyz, ...], Field(max_length=200, json_schema_extra=_IN_VIEW)] = ()
     """Points of a line drawn on the surface (part, mm), for direction `drawn`: at least two."""
-    step_mm: float | None = Field(None, gt=0.0, le=1000.0)
+    step_mm: Real | None = Field(None, gt=0.0, le=1000.0)
     """Index step between passes (mm); null: (1 - overlap) x effective swath."""
-    overlap: float = Field(0.25, ge=0.0, lt=1.0)
+    overlap: Real = Field(0.25, ge=0.0, lt=1.0)
     """Overlap of neighbouring passes as a share of the swath."""
     edge_margin_mm: NonNegativeMm = 5.0
     """Distance kept from the edges (mm, along the surface)."""
-    point_spacing_mm: float = Field(2.0, gt=0.0, le=100.0)
+    point_spacing_mm: Real = Field(2.0, gt=0.0, le=100.0)
     """Acquisition spacing along a pass (mm)."""
-    scan_speed_mm_s: float = Field(100.0, gt=0.0, le=2000.0)
+    scan_speed_mm_s: Real = Field(100.0, gt=0.0, le=2000.0)
     box: Annotated[Box | None, Field(json_schema_extra=_IN_VIEW)] = None
     """Only what of the inspection surface lies inside this box (part, mm) is inspected."""
     paint: Annotated[tuple[Brush, ...], Field(max_length=500, json_schema_extra=_IN_VIEW)] = ()
@@ -250,8 +250,8 @@ class Inspection(Strict):
 class Limits(Strict):
     """Largest correction that is ever exported: displacement of the surface centroid and total rotation."""
 
-    correction_mm: float = Field(15.0, gt=0.0, le=1000.0)
-    correction_deg: float = Field(3.5, gt=0.0, le=45.0)
+    correction_mm: Real = Field(15.0, gt=0.0, le=1000.0)
+    correction_deg: Real = Field(3.5, gt=0.0, le=45.0)
 
 
 class Setup(Strict):
@@ -259,9 +259,9 @@ class Setup(Strict):
 
     probe: Probe = Probe()
     couplant: Couplant = Couplant()
-    standoff_mm: float = Field(15.0, gt=0.0, le=1000.0)
+    standoff_mm: Real = Field(15.0, gt=0.0, le=1000.0)
     """Distance from the TCP to the surface along its normal (mm)."""
-    reference_amplitude_pct: float = Field(50.0, gt=0.0, le=1000.0)
+    reference_amplitude_pct: Real = Field(50.0, gt=0.0, le=1000.0)
     """Front-wall amplitude on a flat, well-aligned section (%FSH)."""
     signals: Signals = Signals()
     tool: Tool = Tool()

@@ -4,7 +4,7 @@ from typing import Annotated, Literal, Self
 
 from pydantic import Field, model_validator
 
-from planner.strict import NonNegativeMm, PositiveMm, Strict, Xyz
+from planner.strict import NonNegativeMm, PositiveMm, Real, Strict, Xyz
 
 MOST_POINTS = 1000
 MOST_FACES = 200_000
@@ -27,7 +27,7 @@ class Brush(Strict):
     """A dab of the brush: what lies inside the sphere is painted, or erased from what was painted before."""
 
     centre_mm: Xyz
-    radius_mm: float = Field(gt=0.0, le=10_000.0)
+    radius_mm: Real = Field(gt=0.0, le=10_000.0)
     erase: bool = False
 
 

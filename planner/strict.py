@@ -1,13 +1,23 @@
 """Base of every settings model, and numbers with their bounds."""
 
-from typing import Annotated
+from typing import Annotated, Any
 
-from pydantic import BaseModel, ConfigDict, Field
+from pydantic import BaseModel, BeforeValidator, ConfigDict, Field
 
-Mm = Annotated[float, Field(ge=-1e5, le=1e5, allow_inf_nan=False)]
-Deg = Annotated[float, Field(ge=-360.0, le=360.0, allow_inf_nan=False)]
-PositiveMm = Annotated[float, Field(gt=0.0, le=1e5, allow_inf_nan=False)]
-NonNegativeMm = Annotated[float, Field(ge=0.0, le=1e5, allow_inf_nan=False)]
+
+def _number(value: Any) -> Any:
+    if isinstance(value, bool | str):
+        raise ValueError("a number is needed, without quotes")
+    return value
+
+
+Real = Annotated[float, BeforeValidator(_number)]
+"""A number. `true` and "15" are none."""
+Whole = Annotated[int, BeforeValidator(_number)]
+Mm = Annotated[Real, Field(ge=-1e5, le=1e5, allow_inf_nan=False)]
+Deg = Annotated[Real, Field(ge=-360.0, le=360.0, allow_inf_nan=False)]
+PositiveMm = Annotated[Real, Field(gt=0.0, le=1e5, allow_inf_nan=False)]
+NonNegativeMm = Annotated[Real, Field(ge=0.0, le=1e5, allow_inf_nan=False)]
 Xyz = tuple[Mm, Mm, Mm]
 """A point in `part`, mm."""
 

@@ -14,6 +14,7 @@ from starlette.requests import ClientDisconnect
 from starlette.routing import Match
 from starlette.types import ASGIApp, Message, Receive, Scope, Send
 
+from app.inputs import NO_OBJECT
 from app.store.refusal import Refusal
 from planner.errors import EchoBaseError
 from planner.issues import Issue
@@ -149,6 +150,9 @@ def _field(error: dict[str, Any]) -> Issue:
         return Issue("error", "not-json", "the body is not valid JSON.", "Correct it.", place)
     if error["type"] == "extra_forbidden":
         return Issue("error", "field-unknown", f"there is no field '{place}'.", "Correct the name or remove it.", place)
+    if error["type"] in NO_OBJECT:
+        text = f"{place}: a JSON object with its fields in {{ }} is needed."
+        return Issue("error", "field-invalid", text, "Send it with Content-Type: application/json.", place)
     code = "field-missing" if error["type"] == "missing" else "field-invalid"
     return Issue("error", code, f"{place}: {message[:1].lower()}{message[1:300]}.", "Correct it.", place)
 
