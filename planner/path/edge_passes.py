@@ -26,8 +26,8 @@ WORTH_MM2 = 40.0
 """What an extra pass has to add to what is covered to be worth its approach."""
 # Neighbouring passes leave nothing wider than this (mm) where they overlap that far.
 _LEAST_SLACK_MM = 2.0
-# Useful stretches nearer to each other than this are one pass.
-_JOIN_MM = 60.0
+# Useful stretches nearer to each other than this are one pass: leaving and approaching takes longer.
+_JOIN_MM = 200.0
 _MOST_TURN_RAD = np.radians(100.0)
 _LOW_SHARE = 20
 _INSIDE = 0.97
