@@ -60,15 +60,27 @@ def complaint(console: str) -> str | None:
 
 
 def file_unit(data: bytes) -> str | None:
-    """Return the length unit a STEP file declares (`mm`, `cm`, `m`, `inch`), or None if it is another or not found."""
+    """Return the length unit a STEP file declares (`mm`, `cm`, `m`, `inch`), or None if it is another, several, or not found.
+
+    It is the one assigned to the shapes (GLOBAL_UNIT_ASSIGNED_CONTEXT): a file in inches also holds the millimetre they are
+    defined by.
+    """
     text = data.decode("latin-1")
-    for entity in re.findall(r"\(([^;]*LENGTH_UNIT\s*\(\s*\)[^;]*)\)\s*;", text):
-        if "CONVERSION_BASED_UNIT" in entity:
-            return "inch" if re.search(r"CONVERSION_BASED_UNIT\s*\(\s*'INCH", entity, re.IGNORECASE) else None
-        si = re.search(r"SI_UNIT\s*\(\s*(\$|\.\w+\.)\s*,\s*\.METRE\.\s*\)", entity)
-        if si:
-            return _UNITS.get(si.group(1).replace("$", ""))
-    return None
+    lengths = {
+        number: _unit_of(entity)
+        for number, entity in re.findall(r"#(\d+)\s*=\s*\(([^;]*LENGTH_UNIT\s*\(\s*\)[^;]*)\)\s*;", text)
+    }
+    assigned = re.findall(r"GLOBAL_UNIT_ASSIGNED_CONTEXT\s*\(\s*\(([^)]*)\)", text)
+    used = {number for refs in assigned for number in re.findall(r"#(\d+)", refs)} & lengths.keys()
+    units = {lengths[number] for number in used or lengths}
+    return units.pop() if len(units) == 1 else None
+
+
+def _unit_of(entity: str) -> str | None:
+    if "CONVERSION_BASED_UNIT" in entity:
+        return "inch" if re.search(r"CONVERSION_BASED_UNIT\s*\(\s*'INCH", entity, re.IGNORECASE) else None
+    si = re.search(r"SI_UNIT\s*\(\s*(\$|\.\w+\.)\s*,\s*\.METRE\.\s*\)", entity)
+    return _UNITS.get(si.group(1).replace("$", "")) if si else None
 
 
 def _diagonal_mm(vertices_m: NDArray[np.float64]) -> float:

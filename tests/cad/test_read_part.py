@@ -95,6 +95,16 @@ def test_step_in_metres_and_inches_has_the_same_size(tmp_path):
     assert refusal(centi, "mm").code == "unit-contradicts"
     assert refusal(PLATE, "inch").code == "unit-contradicts"
     assert file_unit(b"#1=(CONVERSION_BASED_UNIT('INCH',#2)LENGTH_UNIT()NAMED_UNIT(#3));") == "inch"
+    # An inch is defined by a millimetre, which the file then holds too, and first.
+    inch = (
+        f"( CONVERSION_BASED_UNIT('INCH',#99002) LENGTH_UNIT() NAMED_UNIT(#99001) );\n#99000 = {metre};\n"
+        "#99001 = DIMENSIONAL_EXPONENTS(1.,0.,0.,0.,0.,0.,0.);\n"
+        "#99002 = LENGTH_MEASURE_WITH_UNIT(LENGTH_MEASURE(25.4),#99000)"
+    )
+    inches = write(tmp_path, "inch.step", text.replace(metre, inch))
+    assert read_part(inches, "inch.step", "inch").extents_mm == pytest.approx([3810, 2540, 254], abs=1e-3)
+    assert refusal(inches, "mm").code == "unit-contradicts"
+    assert file_unit(inches.read_text().replace("DATA;", f"DATA;\n#98000 = {metre};", 1).encode()) == "inch"
 
 
 def test_a_missing_unit_lists_the_size_in_each():
