@@ -49,6 +49,13 @@ export class View {
   }
 
   dress(inside) {
+    // viser fades its canvas in while the light loads, and stays half faded if a second light comes meanwhile: colours would lie.
+    if (inside?.head && !inside.getElementById("echobase-opaque")) {
+      const style = inside.createElement("style");
+      style.id = "echobase-opaque";
+      style.textContent = "canvas { opacity: 1 !important; }";
+      inside.head.append(style);
+    }
     const canvas = inside?.querySelector("canvas");
     for (let node = canvas?.parentElement; node; node = node.parentElement) {
       if (node.style.background === BACKDROP) return;

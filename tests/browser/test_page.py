@@ -120,6 +120,23 @@ def opened(page, server, pid, step):
     page.locator(".inspector h2", has_text=TITLES[step]).wait_for()
 
 
+OUTSIDE = """() => [...document.querySelectorAll('.top *, .steps *, .tools *, .inspector *, .drawer .tabs *')]
+  .filter((n) => n.offsetParent && (n.getBoundingClientRect().right > innerWidth + 1 || n.getBoundingClientRect().left < -1))
+  .map((n) => `${n.className} ${n.textContent.slice(0, 40)}`)"""
+
+
+def test_nothing_leaves_a_narrow_window_and_colours_are_whole(server, page, pid):
+    opened(page, server, pid, "part")
+    journey.seen(page)
+    for name in ("Part", "Cell", "Surface", "Key points", "Paths", "Programs", "Scan", "Alignment", "Report"):
+        journey.step(page, name)
+        assert page.evaluate(OUTSIDE) == [], name
+        assert page.evaluate("document.documentElement.scrollWidth - innerWidth") <= 0
+    # A legend is only true of a canvas that nothing shines through.
+    canvas = page.frame_locator("iframe").locator("canvas").first
+    assert canvas.evaluate("n => { n.style.opacity = '0.24'; return getComputedStyle(n).opacity; }") == "1"
+
+
 def test_a_setup_edit_is_checked_saved_and_undone(server, page, pid):
     opened(page, server, pid, "cell")
     field = page.locator("input[name='standoff_mm']")

@@ -33,15 +33,18 @@ async function draw(body, alive, charts) {
 
 const TITLES = { before: "before", after: "after", scan: "scan" };
 
+// The first word of a title is the quantity: what stands along the axis, with its unit.
+const quantity = (chart) => `${chart.title.split(" ")[0]}, ${chart.unit}`;
+
 /** Histograms of one chart of the server, one box per series. */
 export function histograms(body, alive, ...charts) {
   return draw(body, alive, charts.flatMap((chart) => Object.entries(chart.series).map(([name, s]) => {
     const middle = s.edges.slice(1).map((e, i) => (e + s.edges[i]) / 2);
-    const numbers = s.n ? `mean ${fixed(s.mean, 3)}, std ${fixed(s.std, 3)}, range ${fixed(s.range, 2)} ${chart.unit}, n ${whole(s.n)}` : "no readings";
+    const numbers = s.n ? `mean ${fixed(s.mean, 3)}, std ${fixed(s.std, 3)}, range ${fixed(s.range, 2)} ${chart.unit}` : "no readings";
     const shapes = chart.tolerance ? [-1, 1].map((k) => ({ type: "line", x0: k * chart.tolerance, x1: k * chart.tolerance, y0: 0, y1: 1, yref: "paper", line: { color: css("--ink-3"), width: 1, dash: "dot" } })) : [];
     return {
       traces: [{ type: "bar", x: middle, y: s.counts, marker: { color: name === "before" ? "#9aa5af" : css("--accent") }, hovertemplate: `%{x:.3f} ${chart.unit}: %{y}<extra></extra>` }],
-      layout: layout(`${chart.title}, ${TITLES[name] ?? name}<br><span style="font-size:11px">${numbers}</span>`, axis(chart.unit), axis("readings"), { shapes, margin: { l: 48, r: 14, t: 48, b: 38 } }),
+      layout: layout(`${chart.title}, ${TITLES[name] ?? name}<br><span style="font-size:11px">${numbers}</span>`, axis(quantity(chart)), axis(`${whole(s.n)} readings`), { shapes, margin: { l: 48, r: 14, t: 48, b: 38 } }),
     };
   })));
 }
@@ -53,7 +56,7 @@ export function overlaid(body, alive, ...charts) {
     const traces = series.map(([name, s]) => ({ type: "bar", name: TITLES[name] ?? name, x: s.edges.slice(1).map((e, i) => (e + s.edges[i]) / 2), y: s.counts, opacity: 0.75, marker: { color: name === "before" ? "#9aa5af" : css("--accent") }, hovertemplate: `${TITLES[name] ?? name}, %{x:.3f} ${chart.unit}: %{y}<extra></extra>` }));
     const numbers = series.map(([name, s]) => `${TITLES[name] ?? name}: mean ${fixed(s.mean, 3)}, std ${fixed(s.std, 3)}`).join("; ");
     const shapes = chart.tolerance ? [-1, 1].map((k) => ({ type: "line", x0: k * chart.tolerance, x1: k * chart.tolerance, y0: 0, y1: 1, yref: "paper", line: { color: css("--ink-3"), width: 1, dash: "dot" } })) : [];
-    return { traces, layout: layout(`${chart.title}<br><span style="font-size:11px">${numbers}</span>`, axis(chart.unit), axis("readings"), { shapes, barmode: "overlay", showlegend: true, legend: { x: 1, xanchor: "right", y: 1 }, margin: { l: 48, r: 14, t: 48, b: 38 } }) };
+    return { traces, layout: layout(`${chart.title}<br><span style="font-size:11px">${numbers}</span>`, axis(quantity(chart)), axis("readings"), { shapes, barmode: "overlay", showlegend: true, legend: { x: 1, xanchor: "right", y: 1 }, margin: { l: 48, r: 14, t: 48, b: 38 } }) };
   }));
 }
 
