@@ -23,11 +23,9 @@ from planner.placement import assume_nominal, correction, part_from_correction
 from planner.surface.curved import CurvedSurface
 from planner.toolpath import ToolPath
 
-PARTIAL = ("not-rigid", "harmful", "lock-contradicted", "non-rigid-support")
+PARTIAL = ("not-rigid", "harmful", "lock-contradicted", "off-edges", "non-rigid-support")
 # What a rigid verdict says of the misfit; said again of what is left after the field.
 ABOUT_MISFIT = ("not-rigid", "residual-large", "limit-displacement", "limit-rotation", "scan-of-another-part")
-# Suspicions that a better explanation dispels: laws in the wrong order make steps at every pass, no smooth shape.
-ABOUT_LAWS = ("laws-reversed", "array-turned")
 # Share of the inspection's data poses that must stand where the data determine the field.
 ENOUGH_POSES = 0.99
 # Share of the patches on the surface that must agree with the deformed part.
@@ -189,9 +187,7 @@ def _adapted(plan: Plan, found: Correction, fit: FieldFit, field: Field) -> Foll
     keyed = _keyed(plan, found, surface, T, field)
     residual = residual_of(fit.patches, replace(fit.rows, r=fit.rest_mm), fit.used)
     T_base_basecorr = correction(T, setup.T_base_partnom)
-    explained = residual.rms_mm <= setup.tolerances.position_mm and field.lengths_mm.min() >= setup.probe.swath_mm
-    overtaken = (*ABOUT_MISFIT, *ABOUT_LAWS) if explained else ABOUT_MISFIT
-    issues = [_of_shape(i) for i in found.issues if i.code not in overtaken]
+    issues = [_of_shape(i) for i in found.issues if i.code not in ABOUT_MISFIT]
     issues += limit_issues(*nominal_shift(setup, T, plan.surface.centroid_part), setup)
     issues += residual_issues(residual.rms_mm, setup)
     issues += _shape_issues(plan, fit, field)

@@ -1,5 +1,6 @@
 """From the CAD of a small wing to the assessed inspection of a sprung-back one: simulated, through the files users have."""
 
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -107,6 +108,19 @@ def test_a_twisted_part_moved_and_sprung_back(folder):
         assert arrays["nodes"].shape == (len(arrays["values"]), 3)
         assert len(arrays["vertex_values"]) == len(arrays["vertices"])
         assert (arrays["sd"] > 0).all()
+
+
+@pytest.mark.slow
+def test_laws_in_the_wrong_order_are_no_shape(folder):
+    """From the wrong end of the array a true part looks sprung back, and a smooth field fits it to a tenth of a millimetre."""
+    plan, reading = load_plan(folder), read_folder(folder, "alignment")
+    taken = simulate(plan.part, plan.surface, reading.path, plan.setup, Truth(OFFSET), Noise(outliers=0.03), 3)
+    wrong = replace(taken, law=(plan.setup.probe.laws + 1 - taken.law).astype(np.int32))
+    write_readings_csv(wrong, folder / "wrong.csv")
+    found = run_align(folder, [folder / "wrong.csv"], AlignOptions(non_rigid=True), quiet).correction
+    assert found["residual"]["rms_mm"] < 0.15
+    assert found["verdict"] == "fail"
+    assert "laws-reversed" in {i["code"] for i in found["issues"]}
 
 
 @pytest.mark.slow
