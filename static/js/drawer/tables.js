@@ -23,19 +23,23 @@ export function matches(body, keypoints, focus) {
     { title: "Amplitude, %FSH", cell: (k) => fixed(k.amplitude_pct, 1) },
     { title: "ToF, µs", cell: (k) => fixed(k.tof_us, 3) },
     { title: "X, mm", cell: (k) => mm(k.x_mm) }, { title: "Y, mm", cell: (k) => mm(k.y_mm) }, { title: "Z, mm", cell: (k) => mm(k.z_mm) },
-    { title: "Reason", text: true, cell: (k) => k.reason ?? "" },
+    { title: "Reason", text: true, cell: (k) => h("span", { class: "reason" }, k.reason ?? "") },
   ], keypoints, (k) => focus(k.id)));
 }
 
 /** The six directions the alignment could or could not measure. */
 export function directions(body, list) {
   if (!list?.length) return fill(body, h("p", { class: "nothing" }, "No directions were reported."));
-  const names = ["rX", "rY", "rZ", "X", "Y", "Z"];
+  const names = ["rX, deg", "rY, deg", "rZ, deg", "X, mm", "Y, mm", "Z, mm"];
+  // What one sigma of it is: a turn about the axes of BASE, and a shift of the middle of the face.
+  const part = (d, i) => d.sigma * (Array.isArray(d.vector) ? d.vector[i] : d.vector?.[i]) * (i < 3 ? 180 / Math.PI : 1);
   return fill(body, table([
     { title: "Direction", text: true, cell: (d) => `${list.indexOf(d) + 1}` },
     { title: "", text: true, cell: (d) => tag(toneOf(d.status), d.status) },
-    { title: "Sigma", cell: (d) => fixed(d.sigma, 4) },
-    ...names.map((name, i) => ({ title: name, cell: (d) => fixed(Array.isArray(d.vector) ? d.vector[i] : d.vector?.[i], 4) })),
+    { title: "Sigma / prior", cell: (d) => fixed(d.sigma, 4) },
+    { title: "Surface, mm rms", cell: (d) => mm(d.displacement_mm) },
+    { title: "Turn, deg", cell: (d) => deg(d.turn_deg) },
+    ...names.map((name, i) => ({ title: name, cell: (d) => fixed(part(d, i), i < 3 ? 4 : 3) })),
   ], list));
 }
 
