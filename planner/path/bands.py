@@ -1,4 +1,4 @@
-"""Narrow probes run several passes side by side through suggested key points, as wide together as the key points look."""
+"""Narrow probes run several passes side by side through suggested key points, wide enough together to fix a plane."""
 
 import numpy as np
 
@@ -9,6 +9,8 @@ from planner.path.section import Stroke, section
 from planner.setup import Setup
 from planner.surface.curved import CurvedSurface
 
+# Width of a band in search radii.
+_WIDE_RADII = 1.2
 # Strips wanted at least, and how long each should be: search radii, and as a share of the surface's size.
 _STRIPS, _LONG_RADII, _LONG_SHARE = 4, 4.0, 0.5
 # Suggested strips of a set made without bands (or by hand, named alike) already cover what was asked.
@@ -21,10 +23,11 @@ def band_passes(curved: CurvedSurface, setup: Setup) -> int:
     """Return how many passes a suggested strip has beside each other, a swath apart.
 
     One line of readings through a key point fixes no plane, and thin lines would have to be many to cover what is asked.
-    Bands are as wide as a search volume, narrower where that would leave less than four strips of a useful length.
+    Bands are somewhat wider than the search radius, which is plenty for a plane, for wider ones would be too few to tell how
+    the whole surface lies; narrower where that would leave less than four strips of a useful length.
     """
     swath, radius = setup.probe.swath_mm, setup.alignment.search_radius_mm
-    widest = int(np.ceil(2.0 * radius / swath - 1e-9))
+    widest = int(np.ceil(_WIDE_RADII * radius / swath - 1e-9))
     length = setup.alignment.coverage * curved.surface.area_mm2 / swath
     each = max(_LONG_RADII * radius, _LONG_SHARE * float(np.sqrt(curved.surface.area_mm2)))
     return int(np.clip(length / (_STRIPS * each), 1, max(widest, 1)))

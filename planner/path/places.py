@@ -55,20 +55,27 @@ def places(curved: CurvedSurface, mesh: PathMesh, strips: list[Strip], each: int
     """Return the key points (k, 3) of strips that are worth having: two to `each` a strip, in order along it.
 
     They keep their search radius from edges, avoid curved places, never stand in a keep-out, and stand two search radii
-    from each other if they can. Strips that cannot have two points without sharing readings are left out, unless so little
-    would be left that no placement could be found.
+    from each other if they can. Strips that cannot have two points on flat places without sharing readings are left out, unless
+    so little would be left that no placement could be found; where most of the surface is curved, points are.
     """
     taken = np.zeros((0, 3))
     good: list[Array] = []
     poor: list[Array] = []
+    rest: list[Strip] = []
     for strip in strips:
-        chosen, sound = _on_strip(curved, mesh, strip, each, taken, setup)
-        if not len(chosen):
-            continue
-        if sound:
+        chosen, sound, flat = _on_strip(curved, mesh, strip, each, taken, setup)
+        if sound and flat:
             good.append(chosen)
             taken = np.concatenate([taken, chosen])
-        else:
+        elif len(chosen):
+            rest.append(strip)
+    mostly_curved = len(good) < max(2, len(rest))
+    for strip in rest:
+        chosen, sound, _ = _on_strip(curved, mesh, strip, each, taken, setup)
+        if sound and mostly_curved:
+            good.append(chosen)
+            taken = np.concatenate([taken, chosen])
+        elif len(chosen):
             poor.append(chosen)
     for chosen in poor[: max(2 - len(good), 0)]:
         gap = _gap(chosen, taken)
@@ -80,8 +87,9 @@ def places(curved: CurvedSurface, mesh: PathMesh, strips: list[Strip], each: int
 
 def _on_strip(
     curved: CurvedSurface, mesh: PathMesh, strip: Strip, each: int, taken: Array, setup: Setup
-) -> tuple[Array, bool]:
-    """Return the points of one strip (k, 3), none if two find no place, and whether they share no readings."""
+) -> tuple[Array, bool, bool]:
+    """Return the points of one strip (k, 3), none if two find no place; whether they keep off edges and share no readings;
+    and whether all stand on flat places."""
     radius, span = setup.alignment.search_radius_mm, strip.s1 - strip.s0
     fine = np.linspace(strip.s0, strip.s1, int(np.clip(span / _FINE_MM, _FEWEST, _MOST)))
     on_line, bary, face = positions(mesh, strip.stroke.line, fine)
@@ -92,7 +100,8 @@ def _on_strip(
     allowed = room >= 0.0
     # What speaks against a place whatever else is chosen: near an edge or a keep-out, curved.
     against = 100.0 * (EDGE_ROOM - edge) + 30.0 * (room < radius)
-    against += too_curved(bend, setup) * (20.0 + 10.0 * bend / max(float(bend.max()), 1e-12))
+    bent = too_curved(bend, setup)
+    against += bent * (20.0 + 10.0 * bend / max(float(bend.max()), 1e-12))
     off = min(strip.inset * radius, max(0.45 * span, span - APART * radius))
     a = strip.s0 + (off if strip.free[0] else 0.0)
     b = strip.s1 - (off if strip.free[1] else 0.0)
@@ -109,7 +118,7 @@ def _on_strip(
         near = np.flatnonzero(allowed & (fine >= low - 1e-9) & (fine <= high + 1e-9))
         if not len(near):
             if needed:
-                return np.zeros((0, 3)), False
+                return np.zeros((0, 3)), False, False
             continue
         gap = _gap(points[near], np.concatenate([taken, points[picked]])) / radius
         cost = against[near] + 100.0 * np.maximum(APART - gap, 0.0) + 15.0 * np.maximum(WELL_APART - gap, 0.0)
@@ -119,7 +128,7 @@ def _on_strip(
             continue
         sound &= bool(gap[k] >= APART and edge[near[k]] >= 1.0)
         picked.append(int(near[k]))
-    return points[sorted(picked)], sound
+    return points[sorted(picked)], sound, not bent[picked].any()
 
 
 def _gap(points: Array, others: Array) -> Array:
