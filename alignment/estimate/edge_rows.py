@@ -28,7 +28,7 @@ class EdgeRows:
     """r (k,): the edge's distance beyond the crossing, mm, in the surface and across the edge. jacobian (k, 6): dr / dxi.
 
     lag (k,): share of the travel across the edge. cosine (k,): of the step across it. valid (k,).
-    point_base (k, 3): on the placed edge. segment (k,).
+    point_base (k, 3): on the placed edge. segment (k,). height_mm (k,): of the law over the surface.
     """
 
     r: Array
@@ -38,6 +38,7 @@ class EdgeRows:
     valid: NDArray[np.bool_]
     point_base: Array
     segment: NDArray[np.int64]
+    height_mm: Array
 
 
 class EdgeMap:
@@ -118,4 +119,4 @@ def edge_rows(
     valid &= ~edges.near_corner(point)
     point_base, b = T_base_part.points(point), T_base_part.directions(conormal)
     lag = np.einsum("ij,ij->i", points.travel_base, b)
-    return EdgeRows(-e, motion_rows(point_base, b, centre_mm), lag, leaves, valid, point_base, segment)
+    return EdgeRows(-e, motion_rows(point_base, b, centre_mm), lag, leaves, valid, point_base, segment, height)

@@ -22,6 +22,7 @@ from alignment.estimate.patches import Patches, condense
 from alignment.estimate.pose_line import PoseLine, pose_line
 from alignment.estimate.problem import Problem
 from alignment.estimate.robust_fit import robust_fit
+from alignment.estimate.sprung import Sprung, beyond_limits, sprung_fit
 from alignment.estimate.surface_rows import Rows, same_afresh
 from alignment.estimate.system import BIAS_SHARE, EdgeData, System
 from planner.frames import Array, Transform
@@ -97,20 +98,27 @@ def align_map(
     line = None if cloud.beams_base is None else pose_line(cloud, setup.probe)
     patches = condense_cloud(cloud, problem, captured.T_base_part, line)
     crossed = edge_data(cloud, problem, line, captured.T_base_part) if edges else None
-    found = fit_captured(problem, captured, patches, crossed, stay_on_edges)
+    found = fit_captured(problem, captured, patches, crossed)
     if isinstance(found, MapFit) and not same_afresh(patches, curved, found.T_base_part, found.rows):
         # Feet that were followed over a fold: now every patch asks the whole surface at every step.
-        strict = replace(patches, follower=Follower(curved))
-        patches = strict
-        found = fit_captured(problem, captured, strict, crossed, stay_on_edges)
-    if (
-        crossed is not None
-        and isinstance(found, MapFit)
-        and (_shape_mm(found) > MUCH_WORSE * SHAPE_MM or off_edges(found.edges))
-    ):
-        # A slide along the shape of a part that sprang back and a late clock explain each other: then the clock is right.
-        found = fit_captured(problem, captured, patches, crossed.as_said(), stay_on_edges, sprung=True)
-    return found
+        patches = replace(patches, follower=Follower(curved))
+        found = fit_captured(problem, captured, patches, crossed)
+    if not isinstance(found, MapFit) or not _may_have_sprung(found, problem):
+        return found
+    # A slide along the shape of a part that sprang back and a late clock explain each other: then the clock is right.
+    as_said = None if crossed is None else crossed.as_said()
+    start = found.T_base_part
+    if beyond_limits(problem, start):
+        start = problem.T_base_nominal
+        patches = condense_cloud(cloud, problem, start, line)
+    sprung = sprung_fit(patches, problem, start, found.T_base_part, as_said, stay_on_edges)
+    return found if sprung is None else fit_captured(problem, captured, patches, as_said, sprung)
+
+
+def _may_have_sprung(found: MapFit, problem: Problem) -> bool:
+    if beyond_limits(problem, found.T_base_part):
+        return True
+    return found.edges is not None and (_shape_mm(found) > MUCH_WORSE * SHAPE_MM or off_edges(found.edges))
 
 
 def _shape_mm(found: MapFit) -> float:
@@ -120,23 +128,13 @@ def _shape_mm(found: MapFit) -> float:
 
 
 def fit_captured(
-    problem: Problem,
-    captured: Captured,
-    patches: Patches,
-    crossed: EdgeData | None,
-    stay_on_edges: bool,
-    sprung: bool = False,
+    problem: Problem, captured: Captured, patches: Patches, crossed: EdgeData | None, sprung: Sprung | None = None
 ) -> MapFit | Captured:
-    """Return the estimate from where the capture led; sprung: the part is known to have another shape than its CAD."""
+    """Return the estimate from where the capture led; sprung: the part is taken to have another shape than its CAD."""
     setup, curved = problem.setup, problem.curved
-    robust = robust_fit(patches, problem, captured.T_base_part, crossed)
-    firm = (
-        robust_fit(patches, problem, robust.T_base_part, crossed, firm=True) if sprung and crossed is not None else None
-    )
-    firm = None if firm is None or firm.edges is None else firm
-    if firm is not None and stay_on_edges:
-        robust = firm
-    elif robust.edges is not None:
+    taken = sprung is not None and sprung.taken
+    robust = sprung.fit if sprung and taken else robust_fit(patches, problem, captured.T_base_part, crossed)
+    if robust.edges is not None and not taken:
         # Now that the edges are known, so is the angle at which they were crossed.
         known = robust.edges.rows(problem, robust.T_base_part)
         sharper = locate(robust.edges.points, known.cosine, setup.probe.beam_width_mm)
@@ -159,21 +157,16 @@ def fit_captured(
         strain = lock_strain(problem, T, free.covariance[:6, :6]) if i == 0 else strain
         held = held_basis(free.covariance[:6, :6], problem.lock_rows(T))
         state, converged = _settle(state, system, mix, held)
-    if firm is not None and stay_on_edges:
-        kept = replace(state, T_base_part=_with_held(problem, firm.T_base_part, held))
-    else:
-        kept = _plain_if_sprung(state, system, _with_held(problem, robust.T_base_part, held))
+    plain = problem.step(robust.T_base_part, -(held @ (held.T @ problem.total(robust.T_base_part))))
+    kept = replace(state, T_base_part=plain) if taken else _plain_if_sprung(state, system, plain)
     # The plain fit has settled, even where the careful one ran off after the shape.
     state, converged = kept, converged or kept is not state
     T = state.T_base_part
     post = _solve(state, system, mix, held)
     scale = problem.prior_sigma
     covariance = _claimed(state, system, mix, held, post.covariance[:6, :6])
-    if firm is not None:
-        # Shape that a slide explains as well as the edges explain the place: the truth may be at either.
-        apart = problem.total(firm.T_base_part) - problem.total(T)
-        apart = apart - held @ (held.T @ apart)
-        covariance = covariance + np.outer(apart, apart)
+    if sprung is not None:
+        covariance = covariance + sprung.doubt(problem, T, held)
     found = directions(covariance, held, problem.lock_rows(T), scale, problem.moments_base(T), setup.tolerances)
     now = system.surface(T)
     of_edges = edge_report(system, T, state.nuisance, post.covariance)
@@ -244,11 +237,6 @@ def _settle(state: State, system: System, mix: Mixture, held: Array) -> tuple[St
         if moves < SOLVED_MM:
             break
     return state, moves < 100.0 * SOLVED_MM
-
-
-def _with_held(problem: Problem, T_base_part: Transform, held: Array) -> Transform:
-    """Return the placement with its held directions at their nominal value."""
-    return problem.step(T_base_part, -(held @ (held.T @ problem.total(T_base_part))))
 
 
 def _plain_if_sprung(state: State, system: System, T_plain: Transform) -> State:

@@ -23,8 +23,9 @@ LEAST_CROSSINGS = 12
 WIDE_MM, WIDE_STEPS, NARROWER, ANNEALED = 3.0, 3, 0.7, 15
 # A row is never taken to know more than this (mm): noise is shared between rows.
 SHARED_MM = 0.1
-# Of a part that sprang back: how much more a crossing says than a patch, and how far its shape may shift one (mm, one sigma).
-FIRM, FIRM_FLOOR_MM = 30.0, 0.2
+# Of a part that sprang back: how far its shape may be off (mm, one sigma), and in how many ways, each as good as one reading of
+# it; and how far crossings may be off for it (mm, one sigma).
+SHAPE_MM, SHAPE_FREEDOM, FIRM_FLOOR_MM = 0.5, 30.0, 0.2
 SETTLED_MM = 1e-3
 LEAST_SHARE = 1.0 / 32.0
 
@@ -44,7 +45,8 @@ def robust_fit(
 ) -> RobustFit:
     """Return the placement of a robust fit (Tukey's biweight, scales from the data) of patches and crossings together.
 
-    firm: the edges say where the part is, whatever its shape would rather have; the surface says the rest.
+    firm: the part has another shape than its CAD. Then the edges say where it is, and of the surface all patches count, but
+    together for no more than a shape has degrees of freedom: it must not outvote edges and fixture.
     """
     T, settled = start, False
     last, last_z, share = np.inf, np.zeros(6), 1.0
@@ -58,15 +60,17 @@ def robust_fit(
         if rows.valid.sum() < 6:
             return RobustFit(T, rows.valid, None, False)
         r, x = rows.r[rows.valid], rows.jacobian[rows.valid] * problem.prior_sigma
-        sigma = mad_sigma(r, SURFACE_FLOOR_MM, about_zero=True)
+        sigma = mad_sigma(r, SHAPE_MM if firm else SURFACE_FLOOR_MM, about_zero=True)
         used = rows.valid.copy()
         used[rows.valid] = np.abs(r) < REJECT * sigma
         w = base[rows.valid] * tukey_weights(r, sigma) / (SHARED_MM + sigma) ** 2
+        if firm:
+            w *= min(1.0, SHAPE_FREEDOM / (w.sum() * sigma**2))
         normal, pull = np.eye(k), -np.r_[problem.total(T), nuisance]
         normal[:6, :6] += (x * w[:, None]).T @ x
         pull[:6] -= (x * w[:, None]).T @ r
         if edges is not None:
-            edges = _add_edges(edges, problem, T, nuisance, normal, pull, _scale_limits(i, firm), FIRM if firm else 1.0)
+            edges = _add_edges(edges, problem, T, nuisance, normal, pull, _scale_limits(i, firm))
         z = share * np.linalg.solve(normal, pull)
         T = problem.step(T, z[:6])
         nuisance = nuisance + z[6:]
@@ -80,7 +84,7 @@ def robust_fit(
             break
     if edges is not None and (edges.used.sum() < LEAST_CROSSINGS or not settled):
         # Crossings that do not agree on a place say nothing; the surface alone says what it can.
-        return robust_fit(patches, problem, start, None)
+        return robust_fit(patches, problem, start, None, firm)
     return RobustFit(T, used, edges, settled)
 
 
@@ -106,7 +110,6 @@ def _add_edges(
     normal: Array,
     pull: Array,
     limits_mm: tuple[float, float],
-    firmness: float,
 ) -> EdgeData:
     """Add the crossings to the normal equations in place; return the edges with the crossings that belong."""
     found = edges.rows(problem, T)
@@ -118,7 +121,7 @@ def _add_edges(
     sigma = float(np.clip(mad_sigma(r[valid], EDGE_FLOOR_MM, about_zero=True), *limits_mm))
     used = valid & (np.abs(r) < EDGE_REJECT * sigma)
     x = np.hstack([found.jacobian * problem.prior_sigma, columns])[used]
-    w = firmness * tukey_weights(r[used], sigma) / (SHARED_MM + sigma) ** 2
+    w = tukey_weights(r[used], sigma) / (SHARED_MM + sigma) ** 2
     normal += (x * w[:, None]).T @ x
     pull -= (x * w[:, None]).T @ r[used]
     return replace(edges, used=used)

@@ -101,7 +101,7 @@ def _fitted(
             parts = [replace(p, follower=Follower(m.curved)) for p, m in zip(parts, members, strict=True)]
         patches = joined_patches(members, parts, problem.curved)
         tracks = SeveralTracks(members, parts)
-        found = fit_captured(problem, worst, patches, together, stay_on_edges=False)
+        found = fit_captured(problem, worst, patches, together)
         if not isinstance(found, MapFit):
             break
         T = found.T_base_part

@@ -119,7 +119,7 @@ class SeveralEdges(EdgeData):
     members: tuple[Member, ...] = ()
     parts: tuple[EdgeData | None, ...] = ()
 
-    def rows(self, problem: Problem, T_base_part: Transform) -> EdgeRows:
+    def cad_rows(self, problem: Problem, T_base_part: Transform) -> EdgeRows:
         """Return the residuals of all crossings, each against the edges of its own plan's surface."""
         centre, out, first = problem.centre_mm(T_base_part), [], 0
         for member, part in zip(self.members, self.parts, strict=True):
@@ -158,5 +158,5 @@ def joined_edges(members: Sequence[Member], parts: Sequence[EdgeData | None]) ->
     every = EdgePoints(*(np.concatenate([getattr(p, f.name) for p in points]) for f in fields(EdgePoints)))
     none = np.zeros(len(every), dtype=bool)
     return SeveralEdges(
-        every, given[0].map, none, given[0].bias_sigma_mm, given[0].lag_sigma_mm, tuple(members), tuple(parts)
+        every, given[0].map, none, given[0].bias_sigma_mm, given[0].lag_sigma_mm, None, tuple(members), tuple(parts)
     )

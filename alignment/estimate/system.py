@@ -32,16 +32,25 @@ TILT_DOUBT = 2.0
 
 @dataclass(frozen=True, eq=False)
 class EdgeData:
-    """The crossings of a scan, the CAD edges, which crossings belong to them (k,), and how unsure bias and lag are."""
+    """The crossings of a scan, the CAD edges, which crossings belong to them (k,), and how unsure bias and lag are.
+
+    shift_mm (k,): how far the part's own shape moves the feet outward, if that is known.
+    """
 
     points: EdgePoints
     map: EdgeMap
     used: NDArray[np.bool_]
     bias_sigma_mm: float
     lag_sigma_mm: float = LAG_SIGMA_MM
+    shift_mm: Array | None = None
 
     def rows(self, problem: Problem, T_base_part: Transform) -> EdgeRows:
-        """Return the residuals of all crossings."""
+        """Return the residuals of all crossings, from their feet on the part's own shape if that is known."""
+        found = self.cad_rows(problem, T_base_part)
+        return found if self.shift_mm is None else replace(found, r=found.r - self.shift_mm)
+
+    def cad_rows(self, problem: Problem, T_base_part: Transform) -> EdgeRows:
+        """Return the residuals of all crossings from their feet on the CAD."""
         return edge_rows(self.points, self.map, problem.curved, T_base_part, problem.centre_mm(T_base_part))
 
     def as_said(self) -> "EdgeData":
