@@ -175,12 +175,12 @@ def test_the_server_answers_others_meanwhile(client, server, address, plane_scan
 
     thread = threading.Thread(target=ask)
     thread.start()
-    begun, longest, asked = time.monotonic(), 0.0, 0
+    begun, longest = time.monotonic(), 0.0
     while thread.is_alive():
         start = time.monotonic()
         assert client.get("/api/v1/health").status_code == 200
-        longest, asked = max(longest, time.monotonic() - start), asked + 1
+        longest = max(longest, time.monotonic() - start)
     thread.join()
     assert answers == [201]
-    assert asked > 10
+    # Held up by the calibration, one of them would have taken all of the time.
     assert longest < 0.5 * (time.monotonic() - begun)
