@@ -92,7 +92,7 @@ def test_a_twisted_part_moved_and_sprung_back(folder):
         sigma = np.array([done.correction["dof"][k]["sigma"] for k in ("x", "y", "a")])
         assert (error[[0, 1, 3]] < 3.0 * sigma).all()
         if followed:
-            assert (error < [0.4, 0.3, 0.2, 0.15, 0.15, 0.2]).all()
+            assert (error < [0.4, 0.4, 0.2, 0.15, 0.15, 0.2]).all()
     # The rigid placement is no worse than the paper's own method on the same data.
     assert figures["rigid"]["tof_std_mm"] < figures["paper"]["tof_std_mm"]
     assert figures["followed"]["tof_std_mm"] <= 0.05
