@@ -57,7 +57,7 @@ def _off(edges: dict[str, Any]) -> list[Issue]:
     if few_agree(edges):
         what = f"only {edges['used']} of {edges['crossings']} crossings lie on the CAD's edges at this placement"
     else:
-        what = f"at this placement the crossings lie {edges['rms_mm']:.2f} mm rms off the CAD's edges"
+        what = f"at this placement the ends of passes lie {edges['off_mm']:.2f} mm rms off the CAD's edges"
     why = "the part has sprung back or is trimmed otherwise, something lies on it, or the laws of the scan are not as said"
     remedy = (
         "Look where they lie off; if the part has sprung back, run the alignment as non-rigid: it stays on the edges."

@@ -16,6 +16,8 @@ from planner.setup import Setup
 NEIGHBOURS = 16
 # A patch this far (mm, and robust standard deviations) from its neighbours' middle is no shape of a part.
 LONE_MM, LONE_SIGMAS = 1.0, 8.0
+# Nor is one that fewer of its readings agree on than this share, or that is worth less than this share of the usual one.
+MOST_AGREE, LEAST_WORTH = 0.5, 0.1
 
 
 @dataclass(frozen=True, eq=False)
@@ -75,7 +77,7 @@ def believable(patches: Patches, rows: Rows, setup: Setup) -> NDArray[np.bool_]:
 
     A bend or a dent is no outlier: patches are compared with their neighbours, not with the rigid part.
     """
-    keep = rows.valid & (np.abs(rows.r) < setup.alignment.search_radius_mm)
+    keep = rows.valid & (np.abs(rows.r) < setup.alignment.search_radius_mm) & _agree(patches)
     for _ in range(2):
         at = np.flatnonzero(keep)
         if len(at) <= NEIGHBOURS:
@@ -84,6 +86,17 @@ def believable(patches: Patches, rows: Rows, setup: Setup) -> NDArray[np.bool_]:
         off = rows.r[at] - np.median(rows.r[at][near], axis=1)
         keep[at] = np.abs(off) < LONE_MM + LONE_SIGMAS * mad_sigma(off, 1e-3, about_zero=True)
     return keep
+
+
+def _agree(patches: Patches) -> NDArray[np.bool_]:
+    """Return which patches (p,) most of their own readings agree on, and that are worth some.
+
+    Where no echo comes back at all, beyond an edge or a step, the few readings that splash left agree on nothing.
+    """
+    cell, p = patches.cells.of_reading, len(patches)
+    total, kept = np.bincount(cell, minlength=p), np.bincount(cell, patches.kept, p)
+    usual = float(np.median(patches.count[patches.count > 0])) if (patches.count > 0).any() else 0.0
+    return (kept >= MOST_AGREE * total) & (patches.count >= LEAST_WORTH * usual)
 
 
 def gather(
