@@ -17,7 +17,7 @@ NEIGHBOURS = 16
 # A patch this far (mm, and robust standard deviations) from its neighbours' middle is no shape of a part.
 LONE_MM, LONE_SIGMAS = 1.0, 8.0
 # Nor is one that fewer of its readings agree on than this share, or that is worth less than this share of the usual one.
-MOST_AGREE, LEAST_WORTH = 0.5, 0.1
+MOST_AGREE, LEAST_WORTH = 0.5, 0.03
 
 
 @dataclass(frozen=True, eq=False)
