@@ -22,8 +22,6 @@ UNMATCHED_MM = 0.5
 SUSPICIOUS_MM = 0.1
 # Another order of laws has to leave less than this share of it.
 BETTER = 0.5
-
-
 # Edges seen this much late or early (mm), and by so many standard deviations, are worth a word.
 LATE_MM, LATE_SIGMAS = 0.15, 4.0
 

@@ -15,7 +15,7 @@ from alignment.estimate.problem import Problem
 from alignment.estimate.robust_fit import RobustFit, robust_fit
 from alignment.estimate.surface_rows import patch_rows
 from alignment.estimate.system import EdgeData
-from alignment.estimate.verdict import nominal_shift
+from alignment.estimate.verdict import limit_issues, nominal_shift
 from planner.frames import Array, Transform
 
 # Rounds of slope of the shape, shift of the feet of crossings, and placement.
@@ -42,9 +42,8 @@ class Sprung:
 
 def beyond_limits(problem: Problem, T_base_part: Transform) -> bool:
     """Return whether the part would have moved farther than the setup's limits allow."""
-    limits, setup = problem.setup.limits, problem.setup
-    shift_mm, turn_deg = nominal_shift(setup, T_base_part, problem.curved.surface.centroid_part)
-    return shift_mm > limits.correction_mm or turn_deg > limits.correction_deg
+    setup = problem.setup
+    return bool(limit_issues(*nominal_shift(setup, T_base_part, problem.curved.surface.centroid_part), setup))
 
 
 def sprung_fit(
@@ -63,7 +62,7 @@ def sprung_fit(
     away = beyond_limits(problem, T_rigid)
     on_cad = robust_fit(patches, problem, start, crossed, firm=True)
     fit = on_cad
-    for _ in range(ROUNDS if fit.edges is not None else 0):
+    for _ in range(ROUNDS):
         if fit.edges is None:
             break
         T = fit.T_base_part

@@ -10,6 +10,7 @@ from planner.placement import part_from_correction
 from planner.setup import Setup
 from tests.alignment.clouds import curved_of, scan
 from tests.loop.surfaces import double_curved
+from tests.non_rigid.cases import thinned
 
 
 def test_splash_where_no_echo_comes_back_is_no_shape():
@@ -27,18 +28,7 @@ def test_splash_where_no_echo_comes_back_is_no_shape():
         distance_mm=np.where(splash, rng.uniform(3.0, 28.0, len(cloud)), cloud.distance_mm),
         amplitude_pct=np.where(splash, rng.uniform(5.0, 50.0, len(cloud)), cloud.amplitude_pct),
     )
-    heard = ~far | splash
-    names = (
-        "origins_base",
-        "beams_base",
-        "arrays_base",
-        "distance_mm",
-        "amplitude_pct",
-        "law",
-        "pose_index",
-        "pass_id",
-    )
-    cloud = replace(cloud, scan_id=cloud.scan_id[heard], **{n: getattr(cloud, n)[heard] for n in names})
+    cloud = thinned(cloud, ~far | splash)
     found = fit_field(cloud, curved_of(skin, 41, 31), cell, T)
     assert found.field is None
     assert not found.seen
