@@ -66,19 +66,32 @@ export function paintGroup(shell, local) {
 export function keepOutGroup(shell, local) {
   const list = shell.project.data.setup.inspection.keep_outs ?? [];
   const change = (i, more) => edit(shell, { keep_outs: list.map((k, j) => (j === i ? { ...k, ...more } : k)) });
-  const row = (k, i) => h("tr", {},
-    h("td", {}, h("input", { type: "text", name: `keep-name-${i}`, maxlength: 40, "aria-label": `Name of ${called(k, i)}`, value: k.name, placeholder: called({}, i), onchange: (e) => change(i, { name: e.target.value }) })),
-    h("td", { class: "num small" }, sizeOf(k)),
-    h("td", {}, h("input", { type: "number", name: `keep-margin-${i}`, min: 0, step: "any", required: true, "aria-label": `Margin of ${called(k, i)}, mm`, title: "Margin (mm)", value: k.margin_mm, onchange: (e) => (e.target.checkValidity() ? change(i, { margin_mm: Number(e.target.value) }) : e.target.reportValidity()) })),
-    h("td", {}, h("input", { type: "checkbox", name: `keep-cross-${i}`, checked: k.may_cross, "aria-label": `The tool may pass over ${called(k, i)}`, onchange: (e) => change(i, { may_cross: e.target.checked }) })),
-    h("td", {}, button("×", () => edit(shell, { keep_outs: list.filter((_, j) => j !== i) }), { class: "ghost tiny", key: `keep-del-${i}`, title: "Delete", "aria-label": `Delete ${called(k, i)}` })));
+  const row = (k, i) => h("li", {},
+    h("input", { type: "text", name: `keep-name-${i}`, maxlength: 40, "aria-label": `Name of ${called(k, i)}`, value: k.name, placeholder: called({}, i), onchange: (e) => change(i, { name: e.target.value }) }),
+    h("span", { class: "num small soft" }, sizeOf(k)),
+    button("✕", () => edit(shell, { keep_outs: list.filter((_, j) => j !== i) }), { class: "ghost tiny", key: `keep-del-${i}`, title: "Delete", "aria-label": `Delete ${called(k, i)}` }),
+    h("div", { class: "row small" },
+      h("label", { title: "What the passes keep from it" }, "margin", length(`keep-margin-${i}`, `Margin of ${called(k, i)}, mm`, k.margin_mm, (v) => change(i, { margin_mm: v }), { min: 0, required: true }), "mm"),
+      h("label", { title: "How high it stands above the surface: nozzle and wrist keep clear of that. Blank: not known." }, "height", length(`keep-height-${i}`, `Height of ${called(k, i)} above the surface, mm`, k.height_mm, (v) => change(i, { height_mm: v }), { placeholder: "unknown" }, above), "mm"),
+      h("label", {}, h("input", { type: "checkbox", name: `keep-cross-${i}`, checked: k.may_cross, "aria-label": `The tool may pass over ${called(k, i)}`, onchange: (e) => change(i, { may_cross: e.target.checked }) }), "the tool may pass over it")));
   const send = () => shell.view.send({ brush_mm: local.region, may_cross: local.cross });
   return group(local, "keep", "Keep-out regions", list.length ? String(list.length) : "none",
-    list.length > 0 && h("table", { class: "small" }, h("thead", {}, h("tr", {}, ["Name", "Size", "Margin", "Over it", ""].map((t) => h("th", {}, t)))), h("tbody", {}, list.map(row))),
+    list.length > 0 && h("ul", { class: "keep-outs" }, list.map(row)),
     number("region", "Radius of the next", local.region, "mm", (v) => { local.region = v; send(); }, 0.1),
     h("label", { class: "row tight" }, h("input", { type: "checkbox", name: "region-cross", checked: local.cross, onchange: (e) => { local.cross = e.target.checked; send(); } }), "The tool may pass over it"),
     h("div", { class: "row" }, toolButton(shell, "keepout", "Add by a click", "Stop adding", { brush_mm: local.region, may_cross: local.cross })));
 }
+
+/** A length in a list; blank is null where it may be. `refuse(v)` says what is wrong with a number beyond its bounds. */
+function length(name, label, value, change, props, refuse = () => "") {
+  return h("input", { type: "number", name, step: "any", "aria-label": label, value: value ?? "", ...props, onchange: (e) => {
+    const v = e.target.value === "" ? null : Number(e.target.value);
+    e.target.setCustomValidity(v === null ? "" : refuse(v));
+    if (e.target.checkValidity()) change(v); else e.target.reportValidity();
+  } });
+}
+
+const above = (v) => (v > 0 ? "" : "A height is above 0; leave it blank if it is not known.");
 
 /** What a keep-out is called where it has no name. */
 const called = (k, i) => k.name || `keep-out ${i + 1}`;
