@@ -160,8 +160,9 @@ def residual_of(patches: Patches, rows: Rows, used: NDArray[np.bool_]) -> Residu
     order = np.argsort(np.abs(r))
     share = np.cumsum(count[order]) / count.sum()
     p95 = float(np.abs(r)[order][np.searchsorted(share, 0.95)])
-    kept = int(np.count_nonzero(patches.kept & used[patches.cells.of_reading]))
-    return Residual(rms, p95, float(np.abs(r).max()), kept)
+    kept = np.count_nonzero(patches.kept & used[patches.cells.of_reading])
+    # Of very dense scans some readings stand for all.
+    return Residual(rms, p95, float(np.abs(r).max()), round(kept * patches.total / len(patches.kept)))
 
 
 def baseline_of(problem: Problem, baseline: KeyPointFit | None) -> Transform | None:

@@ -6,8 +6,8 @@ import numpy as np
 
 from alignment.cloud import PointCloud
 from alignment.estimate.consensus import BETTER_AGREEMENT, SUSPICIOUS_AGREEMENT, agreement, consensus_starts
-from alignment.estimate.patches import model_readings, reading_weights, sample_rows
 from alignment.estimate.problem import Problem
+from alignment.estimate.readings import model_readings, reading_weights, sample_rows
 from alignment.estimate.robust import huber_weights, mad_sigma, tukey_weights
 from alignment.estimate.surface_rows import Rows, Track
 from planner.frames import Array, Transform

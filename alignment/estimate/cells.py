@@ -5,8 +5,8 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from alignment.cloud import PointCloud
 from alignment.estimate.pose_line import PoseLine
+from alignment.estimate.readings import Readings
 from planner.frames import Array
 from planner.probe import law_offsets_mm
 from planner.setup import Probe
@@ -17,11 +17,11 @@ COARSER = 1.25
 
 @dataclass(frozen=True, eq=False)
 class Cells:
-    """c cells over n readings.
+    """c cells over m readings.
 
-    of_reading (n,): cell of each reading. pass_id (c,): its pass. s_from_mm, s_to_mm (c,): its stretch of path; NaN for
-    ready surface points. across_mm (c,): position of its middle on the array axis. block (c,): cells of one stretch of one
-    pass, whatever their laws, share a number.
+    of_reading (m,): cell of each reading that is looked at. pass_id (c,): its pass. s_from_mm, s_to_mm (c,): its stretch of
+    path; NaN for ready surface points. across_mm (c,): position of its middle on the array axis. block (c,): cells of one
+    stretch of one pass, whatever their laws, share a number.
     """
 
     of_reading: NDArray[np.int32]
@@ -36,12 +36,12 @@ class Cells:
 
 
 def cells_along_passes(
-    cloud: PointCloud, line: PoseLine, probe: Probe, cell_mm: float, most: int | None = None
+    readings: Readings, line: PoseLine, probe: Probe, cell_mm: float, most: int | None = None
 ) -> Cells:
     """Return cells of about `cell_mm` along each pass and across the laws; larger ones until there are at most `most`."""
     x = law_offsets_mm(probe)
     heard = np.zeros((len(line.present), len(x)), dtype=bool)
-    heard.reshape(-1)[cloud.pose_index * np.int64(len(x)) + (cloud.law - 1)] = True
+    heard.reshape(-1)[readings.pose_index * np.int64(len(x)) + (readings.law - 1)] = True
     while True:
         block_of_pose, s_from, s_to, block_pass = _stretches(line, cell_mm)
         bands = max(1, round(float(np.ptp(x) + probe.pitch_mm) / cell_mm)) if len(x) > 1 else 1
@@ -58,8 +58,8 @@ def cells_along_passes(
     cell = np.flatnonzero(used)
     block, band = cell // bands, cell % bands
     middle = np.bincount(band_of_law, x, bands) / np.maximum(np.bincount(band_of_law, minlength=bands), 1)
-    at = (block_of_pose * bands).astype(np.int32)[cloud.pose_index]
-    at += np.r_[0, band_of_law].astype(np.int32)[cloud.law]
+    at = (block_of_pose * bands).astype(np.int32)[readings.pose_index]
+    at += np.r_[0, band_of_law].astype(np.int32)[readings.law]
     return Cells(
         number[at],
         block_pass[block],

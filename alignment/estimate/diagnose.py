@@ -8,8 +8,8 @@ from alignment.estimate.contest import fits_better
 from alignment.estimate.edge_diagnose import edge_issues, order_by_edges
 from alignment.estimate.hypotheses import Hypothesis, array_hypotheses, place_hypotheses, thinned
 from alignment.estimate.map import MapFit
-from alignment.estimate.patches import model_readings, reading_weights
 from alignment.estimate.problem import Problem
+from alignment.estimate.readings import model_readings, reading_weights
 from alignment.estimate.robust import mad_sigma
 from alignment.estimate.surface_rows import Rows, distance_rows
 from planner.couplant import sound_speed_m_s, water_speed_m_s

@@ -7,8 +7,8 @@ from functools import partial
 import numpy as np
 
 from alignment.cloud import PointCloud
-from alignment.estimate.patches import sample_rows
 from alignment.estimate.pose_line import pose_line
+from alignment.estimate.readings import sample_rows
 from planner.frames import Array, Transform
 from planner.probe import law_offsets_mm
 from planner.setup import Setup

@@ -1,5 +1,6 @@
 """The MAP estimate: where the part most probably is, given the distances, the edges, the fixture and the noise."""
 
+from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass, replace
 from typing import Any
 
@@ -8,7 +9,7 @@ from numpy.typing import NDArray
 
 from alignment.cloud import PointCloud
 from alignment.estimate.capture import Captured, capture
-from alignment.estimate.cells import cells_along_passes, cells_in_space
+from alignment.estimate.cells import Cells, cells_along_passes, cells_in_space
 from alignment.estimate.directions import Direction, directions, held_basis
 from alignment.estimate.edge_curve import locate
 from alignment.estimate.edge_gain import tilt_loss_db
@@ -17,10 +18,12 @@ from alignment.estimate.edge_report import edge_report, off_edges
 from alignment.estimate.edge_rows import EdgeMap
 from alignment.estimate.locks import LockStrain, lock_strain
 from alignment.estimate.mixture import Mixture, Posterior, mixture, solve, tail_scale
-from alignment.estimate.noise_fit import NoiseFit, fit_noise, noise_prior
+from alignment.estimate.noise_fit import NoiseFit, fit_noise
+from alignment.estimate.noise_prior import noise_prior
 from alignment.estimate.patches import Patches, condense
 from alignment.estimate.pose_line import PoseLine, pose_line
 from alignment.estimate.problem import Problem
+from alignment.estimate.readings import Readings, look_at
 from alignment.estimate.robust_fit import robust_fit
 from alignment.estimate.sprung import Sprung, beyond_limits, sprung_fit
 from alignment.estimate.surface_rows import Rows, same_afresh
@@ -92,11 +95,14 @@ def align_map(
     least of the shape is left, even if that is a slide off the edges: the covariance then reaches to where they put it.
     """
     problem = Problem(curved, setup)
-    captured = capture(cloud, problem)
+    # The capture is many small steps, the rest few large ones that let go of the interpreter: side by side.
+    with ThreadPoolExecutor(1) as beside:
+        ahead = beside.submit(_ahead, cloud, problem)
+        captured = capture(cloud, problem)
+        line, readings, cells = ahead.result()
     if not captured.converged:
         return captured
-    line = None if cloud.beams_base is None else pose_line(cloud, setup.probe)
-    patches = condense_cloud(cloud, problem, captured.T_base_part, line)
+    patches = condense(readings, cells, curved, captured.T_base_part)
     crossed = edge_data(cloud, problem, line, captured.T_base_part) if edges else None
     found = fit_captured(problem, captured, patches, crossed)
     if isinstance(found, MapFit) and not same_afresh(patches, curved, found.T_base_part, found.rows):
@@ -110,7 +116,7 @@ def align_map(
     start = found.T_base_part
     if beyond_limits(problem, start):
         start = problem.T_base_nominal
-        patches = condense_cloud(cloud, problem, start, line)
+        patches = condense(readings, cells, curved, start)
     sprung = sprung_fit(patches, problem, start, found.T_base_part, as_said, stay_on_edges)
     return found if sprung is None else fit_captured(problem, captured, patches, as_said, sprung)
 
@@ -143,7 +149,7 @@ def fit_captured(
         return captured
     system = System(problem, patches, robust.used, robust.edges).grouped(robust.T_base_part)
     state = State(robust.T_base_part, np.zeros(system.unknowns - 6))
-    size = float(np.ptp(curved.surface.vertices, axis=0).max())
+    size = float(curved.surface.extents_mm.max())
     rows = system.rows(state.T_base_part, state.nuisance)
     noise = fit_noise(rows, noise_prior(patches.sigma_mm, size, setup.probe.swath_mm))
     mix = mixture(rows, noise, FEW)
@@ -196,13 +202,29 @@ def condense_cloud(
     cloud: PointCloud, problem: Problem, T_base_part: Transform, line: PoseLine | None = None
 ) -> Patches:
     """Return the patches of a cloud: along its passes, or in space where it has none."""
-    setup = problem.setup
-    if cloud.beams_base is None:
-        cells = cells_in_space(cloud.origins_base, CELL_MM, MOST_CELLS)
-    else:
-        line = pose_line(cloud, setup.probe) if line is None else line
-        cells = cells_along_passes(cloud, line, setup.probe, CELL_MM, MOST_CELLS)
-    return condense(cloud, cells, problem.curved, T_base_part, setup.alignment.point_model)
+    return condense(
+        *_gathered(cloud, problem, _line(cloud, problem) if line is None else line), problem.curved, T_base_part
+    )
+
+
+def _line(cloud: PointCloud, problem: Problem) -> PoseLine | None:
+    return None if cloud.beams_base is None else pose_line(cloud, problem.setup.probe)
+
+
+def _gathered(cloud: PointCloud, problem: Problem, line: PoseLine | None) -> tuple[Readings, Cells]:
+    readings = look_at(cloud, problem.setup.alignment.point_model)
+    if line is None:
+        return readings, cells_in_space(readings.origins_base, CELL_MM, MOST_CELLS)
+    return readings, cells_along_passes(readings, line, problem.setup.probe, CELL_MM, MOST_CELLS)
+
+
+def _ahead(cloud: PointCloud, problem: Problem) -> tuple[PoseLine | None, Readings, Cells]:
+    """Return what does not hang on where the part is; of the surface, have it ready."""
+    problem.curved.get_ready()
+    line = _line(cloud, problem)
+    readings, cells = _gathered(cloud, problem, line)
+    _ = problem.moments_part
+    return line, readings, cells
 
 
 def _solve(state: State, system: System, mix: Mixture, held: Array) -> Posterior:

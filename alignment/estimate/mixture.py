@@ -6,8 +6,9 @@ from functools import lru_cache
 import numpy as np
 from scipy.stats import chi2, norm, qmc
 
-from alignment.estimate.noise_fit import NoiseFit, factor, whiten, whiten_back
+from alignment.estimate.noise_fit import NoiseFit
 from alignment.estimate.noise_kernel import Kernel
+from alignment.estimate.noise_mode import factor, whiten, whiten_back
 from alignment.estimate.noise_rows import NoiseRows
 from planner.frames import Array
 
@@ -16,7 +17,7 @@ LIGHT = 3e-3
 # Designs that differ by less than this share give the same estimate to this share of its standard deviation.
 SAME = 1e-3
 # The region that a covariance claims, and how many samples tell how much of a mixture lies in it.
-REGION, SAMPLES = 0.95, 16_384
+REGION, SAMPLES = 0.95, 8_192
 # A direction with less than this share of the motion is one of the nuisances.
 HARDLY = 1e-9
 
@@ -69,7 +70,7 @@ def mixture(rows: NoiseRows, fit: NoiseFit, most: int | None = None) -> Mixture:
 
 
 def _whitened(kernel: Kernel, theta: Array, x: Array) -> tuple[Array, Array] | None:
-    lower = factor(kernel.covariance(theta))
+    lower = factor(len(x), kernel.covariance(theta))
     if lower is None:
         return None
     xw = whiten(lower, x)

@@ -6,25 +6,28 @@ T_new = Tr(c) Exp(xi) Tr(-c) T. The six-vector is rotation first, Exp is that of
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.spatial.transform import Rotation
+from scipy.spatial.transform import RigidTransform, Rotation
 
 from planner.frames import Array, Transform
 
 
-def shift(offset_mm: Array) -> Transform:
-    """Return the pure translation within `base`."""
-    return Transform.from_parts("base", "base", Rotation.identity(), offset_mm)
-
-
 def moved(T_base_part: Transform, xi: Array, centre_mm: Array) -> Transform:
     """Return the placement after the motion xi about the centre."""
-    return shift(centre_mm) @ Transform.from_exp("base", "base", xi) @ shift(-centre_mm) @ T_base_part
+    # In matrices: composing scipy's transforms, which are made orthonormal each time, is most of what a step would cost.
+    step = RigidTransform.from_exp_coords(np.asarray(xi, dtype=np.float64)).as_matrix()
+    step[:3, 3] += centre_mm - step[:3, :3] @ centre_mm
+    return Transform(T_base_part.dst, T_base_part.src, _rigid(step @ T_base_part.matrix))
 
 
 def motion_between(T_base_old: Transform, T_base_new: Transform, centre_mm: Array) -> Array:
     """Return the xi (6,) that moves the old placement to the new one about the centre."""
-    step = T_base_new @ T_base_old.inv()
-    return (shift(-centre_mm) @ step @ shift(centre_mm)).exp
+    step = T_base_new.matrix @ T_base_old.inv().matrix
+    step[:3, 3] += step[:3, :3] @ centre_mm - centre_mm
+    return np.asarray(_rigid(step).as_exp_coords())
+
+
+def _rigid(matrix: Array) -> RigidTransform:
+    return RigidTransform(matrix, normalize=False, copy=False)
 
 
 def motion_rows(points_base: Array, directions_base: Array, centre_mm: Array) -> Array:
@@ -56,12 +59,13 @@ def _cross_matrix(v: Array) -> Array:
 def area_moments(vertices: Array, faces: NDArray[np.int32], areas: Array) -> Array:
     """Return the second moment (3, 3) of a triangulated area about its centroid, mm2 (per unit area)."""
     share = areas / areas.sum()
-    third = (vertices[faces[:, 0]] + vertices[faces[:, 1]] + vertices[faces[:, 2]]) / 3.0
-    centre = share @ third
+    corners = np.ascontiguousarray(faces.T)
+    third = np.stack([sum(x.take(c) for c in corners) / 3.0 for x in np.ascontiguousarray(vertices.T)])
+    centre = third @ share
     # Exact for a triangle: (sum of corner products + sum of corners, multiplied) / 12. The first sum goes by corners.
-    at_vertex = sum((np.bincount(faces[:, k], share, len(vertices)) for k in range(3)), np.zeros(len(vertices)))
-    d, total = vertices - centre, third - centre
-    return np.asarray(((at_vertex[:, None] * d).T @ d + 9.0 * (share[:, None] * total).T @ total) / 12.0)
+    at_vertex = sum((np.bincount(c, share, len(vertices)) for c in corners), np.zeros(len(vertices)))
+    d, total = vertices - centre, third - centre[:, None]
+    return np.asarray(((at_vertex[:, None] * d).T @ d + 9.0 * (share * total) @ total.T) / 12.0)
 
 
 def rms_displacement_mm(xi: Array, moments_base: Array) -> float:

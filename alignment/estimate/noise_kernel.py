@@ -10,6 +10,8 @@ from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
+from numpy.typing import NDArray
+from scipy.linalg.lapack import dtrttf
 from scipy.spatial.distance import pdist, squareform
 
 from alignment.estimate.noise_rows import NoiseRows
@@ -39,6 +41,11 @@ class Kernel:
     """Covariances of the rows of one scan for any hyper-parameters theta (9,): logarithms of `NAMES`."""
 
     rows: NoiseRows
+
+    @cached_property
+    def x_and_r(self) -> Array:
+        """The design and the residuals side by side (n, k + 1)."""
+        return np.asfortranarray(np.column_stack([self.rows.x, self.rows.r]))
 
     @cached_property
     def _distance(self) -> Array:
@@ -98,13 +105,40 @@ class Kernel:
         return tuple(sorted(out))
 
     @cached_property
-    def _room(self) -> tuple[Array, Array, Array]:
-        """Three (n, n) to work in: asking the system for memory costs as much as the arithmetic."""
-        n = len(self.rows)
-        return np.zeros((n, n)), np.zeros((n, n)), np.zeros((n, n))
+    def _place(self) -> NDArray[np.int64]:
+        """Where in a matrix (n, n), flat, the entries of its packed lower triangle are (m,), m = n (n + 1) / 2.
 
-    def path_correlation(self, length_mm: float, gap_mm: float, out: Array | None = None) -> Array:
-        """Return the correlation (n, n) of means over stretches of an exponential process along the path."""
+        Rectangular full packed (F. G. Gustavson et al., ACM Trans. Math. Softw. 37 (2010) 18, doi:10.1145/1731022.1731028):
+        half the work of filling a matrix in, and LAPACK factors it as fast as a whole one.
+        """
+        n = len(self.rows)
+        return np.asarray(dtrttf(np.arange(float(n * n)).reshape(n, n), uplo="L")[0]).astype(np.int64)
+
+    @cached_property
+    def diagonal(self) -> NDArray[np.int64]:
+        """Where the diagonal (n,) is in what `covariance` returns."""
+        row, column = np.divmod(self._place, len(self.rows))
+        on = np.flatnonzero(row == column)
+        return on[np.argsort(row[on])]
+
+    @cached_property
+    def _packed(self) -> tuple[Array, Array, Array, Array | None, NDArray[np.int64]]:
+        """`_distance`, the three of `_pair`, and the place in a matrix of blocks, all packed (m,)."""
+        surface, x, both = self._pair
+        row, column = np.divmod(self._place, len(self.rows))
+        block = self.rows.block.astype(np.int64)
+        pair = np.maximum(block[row], 0) * len(self._apart) + np.maximum(block[column], 0)
+        take = lambda full: full.ravel().take(self._place)  # noqa: E731
+        return take(self._distance), take(surface), take(x), None if both is None else take(both), pair
+
+    @cached_property
+    def _room(self) -> tuple[Array, Array, Array]:
+        """Three (m,) to work in: asking the system for memory costs as much as the arithmetic."""
+        m = len(self._place)
+        return np.zeros(m), np.zeros(m), np.zeros(m)
+
+    def block_correlation(self, length_mm: float, gap_mm: float) -> Array:
+        """Return the correlation (b, b) of means over stretches of an exponential process along the path."""
         width = (self.rows.block_to_mm - self.rows.block_from_mm) / length_mm
         safe = np.maximum(width, 1e-9)
         small = width < 1e-4
@@ -114,36 +148,25 @@ class Kernel:
         c *= mean[:, None]
         c *= mean
         np.fill_diagonal(c, own)
-        # Symmetric, so that whole rows can be copied both times. ("clip" only says that no index can be wrong.)
-        half = np.ascontiguousarray(c.take(self.rows.block, axis=0).T)
-        return half.take(self.rows.block, axis=0, out=out, mode="clip")
-
-    def field_correlation(self, length_mm: float, out: Array | None = None) -> Array:
-        """Return the correlation (n, n) of the form error; edges measure something else."""
-        c = np.multiply(self._distance, -1.0 / length_mm, out=out)
-        return np.exp(c, out=c)
+        return c
 
     def covariance(self, theta: Array) -> Array:
-        """Return K (n, n), mm2; the same memory at every call."""
+        """Return K, mm2, packed (m,); the same memory at every call."""
         v = np.exp(theta)
         k, scale, part = self._room
-        self.field_correlation(v[FIELD_LENGTH], out=k)
+        distance, surface, x, both, pair = self._packed
+        np.exp(np.multiply(distance, -1.0 / v[FIELD_LENGTH], out=k), out=k)
         k *= v[FIELD] ** 2
         if self.rows.has_path:
-            self._path_scale(v, scale, part)
-            scale *= self.path_correlation(v[LENGTH], v[GAP], out=part)
+            np.multiply(surface, v[PATH] ** 2, out=scale)
+            scale += np.multiply(x, v[TILT] ** 2, out=part)
+            if both is not None:
+                scale += np.multiply(both, v[EDGE_PATH] ** 2, out=part)
+            # ("clip" only says that no index can be wrong.)
+            scale *= self.block_correlation(v[LENGTH], v[GAP]).ravel().take(pair, out=part, mode="clip")
             k += scale
-        k[np.diag_indices(len(self.rows))] += sum(self._nuggets(v))
+        k[self.diagonal] += sum(self._nuggets(v))
         return k
-
-    def _path_scale(self, v: Array, out: Array, part: Array) -> Array:
-        """Fill in the variance and covariance (n, n) of the error of the pose, were it one for all poses."""
-        surface, x, both = self._pair
-        np.multiply(surface, v[PATH] ** 2, out=out)
-        out += np.multiply(x, v[TILT] ** 2, out=part)
-        if both is not None:
-            out += np.multiply(both, v[EDGE_PATH] ** 2, out=part)
-        return out
 
     def _nuggets(self, v: Array) -> tuple[Array, Array]:
         """Variances (n,) that each row has for itself: of surface rows and of edge rows."""
@@ -151,24 +174,35 @@ class Kernel:
         return np.where(edge, 0.0, v[NUGGET] ** 2 / count), np.where(edge, v[EDGE_NUGGET] ** 2 / count, 0.0)
 
     def derivatives(self, theta: Array) -> list[Array]:
-        """Return the derivatives (n, n) of K by the logarithms of the active hyper-parameters."""
+        """Return the derivatives, packed (m,), of K by the logarithms of the active hyper-parameters."""
         v = np.exp(theta)
         nugget, edge_nugget = self._nuggets(v)
-        field = v[FIELD] ** 2 * self.field_correlation(v[FIELD_LENGTH])
+        distance, surface, x, both, pair = self._packed
+        field = v[FIELD] ** 2 * np.exp(distance * (-1.0 / v[FIELD_LENGTH]))
         by = {
-            NUGGET: np.diag(2.0 * nugget),
+            NUGGET: self._on_diagonal(2.0 * nugget),
             FIELD: 2.0 * field,
-            FIELD_LENGTH: field * (self._distance / v[FIELD_LENGTH]),
-            EDGE_NUGGET: np.diag(2.0 * edge_nugget),
+            FIELD_LENGTH: field * distance * (1.0 / v[FIELD_LENGTH]),
+            EDGE_NUGGET: self._on_diagonal(2.0 * edge_nugget),
         }
         if self.rows.has_path:
-            surface, x, both = self._pair
-            scale = self._path_scale(v, *self._room[1:])
-            c, h = self.path_correlation(v[LENGTH], v[GAP]), 1e-4
-            by[PATH] = 2.0 * v[PATH] ** 2 * surface * c
-            by[TILT] = 2.0 * v[TILT] ** 2 * x * c
+            at, h = self.block_correlation(v[LENGTH], v[GAP]), 1e-4
+            by_length = (self.block_correlation(v[LENGTH] * np.exp(h), v[GAP]) - at) / h
+            by_gap = (self.block_correlation(v[LENGTH], v[GAP] * np.exp(h)) - at) / h
+            c, by_length, by_gap = (each.ravel().take(pair, mode="clip") for each in (at, by_length, by_gap))
+            by[PATH] = surface * c
+            by[PATH] *= 2.0 * v[PATH] ** 2
+            by[TILT] = x * c
+            by[TILT] *= 2.0 * v[TILT] ** 2
+            scale = v[PATH] ** 2 * surface + v[TILT] ** 2 * x
             if both is not None:
-                by[EDGE_PATH] = 2.0 * v[EDGE_PATH] ** 2 * both * c
-            by[LENGTH] = scale * (self.path_correlation(v[LENGTH] * np.exp(h), v[GAP]) - c) / h
-            by[GAP] = scale * (self.path_correlation(v[LENGTH], v[GAP] * np.exp(h)) - c) / h
+                by[EDGE_PATH] = both * c
+                by[EDGE_PATH] *= 2.0 * v[EDGE_PATH] ** 2
+                scale += v[EDGE_PATH] ** 2 * both
+            by[LENGTH], by[GAP] = scale * by_length, scale * by_gap
         return [by[i] for i in self.active]
+
+    def _on_diagonal(self, values: Array) -> Array:
+        out = np.zeros(len(self._place))
+        out[self.diagonal] = values
+        return out

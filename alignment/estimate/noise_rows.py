@@ -9,8 +9,10 @@ from alignment.estimate.patches import Patches
 from alignment.estimate.surface_rows import Rows
 from planner.frames import Array
 
-TARGET_ROWS = 320
+TARGET_ROWS = 200
 MOST_BANDS = 3
+# Rows that are too many stand for so many times longer stretches, on average.
+LONGER = 1.15
 
 
 @dataclass(frozen=True, eq=False)
@@ -45,6 +47,11 @@ class NoiseRows:
         return bool((self.block >= 0).any())
 
 
+def has_path(patches: Patches) -> bool:
+    """Return whether the patches lie along passes."""
+    return not bool(np.isnan(patches.cells.s_from_mm).all())
+
+
 def coarse_of(patches: Patches, used: NDArray[np.bool_], target: int = TARGET_ROWS) -> tuple[NDArray[np.int64], Array]:
     """Return the row (p,) of each used patch (-1: unused) and [from, to, pass, band] per row (n, 4).
 
@@ -58,11 +65,11 @@ def coarse_of(patches: Patches, used: NDArray[np.bool_], target: int = TARGET_RO
     within = cells.block - low[pass_number]
     bands = np.unique(np.round(cells.across_mm, 6), return_inverse=True)[1]
     band_count = 1 + int(bands.max(initial=0))
-    for join in _joins(int(within.max(initial=0)) + 1):
-        merged = min(band_count, MOST_BANDS if join <= 4 else 2)
+    for join, merged in _joins(int(within.max(initial=0)) + 1, min(band_count, MOST_BANDS)):
         band = bands * merged // band_count
-        per_pass = 1 + int(within.max(initial=0)) // join
-        key = (pass_number * per_pass + within // join) * merged + band
+        stretch = (within / join).astype(np.int64)
+        per_pass = 1 + int(stretch.max(initial=0))
+        key = (pass_number * per_pass + stretch) * merged + band
         row_key = np.unique(key[used])
         if len(row_key) <= target:
             break
@@ -76,18 +83,33 @@ def coarse_of(patches: Patches, used: NDArray[np.bool_], target: int = TARGET_RO
     return row, np.column_stack([s_from, s_to, number // per_pass, number])
 
 
-def _joins(longest: int) -> list[int]:
-    joins = [1]
+def _joins(longest: int, bands: int) -> list[tuple[float, int]]:
+    """Return ways to join, from fine to coarse: so many stretches to one, and into how many bands of laws.
+
+    Two bands still show an array that tilts; shorter stretches say more of a robot that wanders than a third band does.
+    """
+    joins = [1.0]
     while joins[-1] < longest:
-        joins.append(max(joins[-1] + 1, round(joins[-1] * 1.3)))
-    return joins
+        joins.append(LONGER * joins[-1])
+    ways = {(join, merged) for join in joins for merged in {bands, min(bands, 2)}}
+    return sorted(ways, key=lambda way: way[0] / way[1])
 
 
-def noise_rows(patches: Patches, rows: Rows, used: NDArray[np.bool_], prior_sigma: Array, swath_mm: float) -> NoiseRows:
-    """Return patches `used` (p,) joined to rows: means weighted by readings, which keeps them linear in the unknowns."""
-    if np.isnan(patches.cells.s_from_mm).all():
+def noise_rows(
+    patches: Patches,
+    rows: Rows,
+    used: NDArray[np.bool_],
+    prior_sigma: Array,
+    swath_mm: float,
+    coarse: tuple[NDArray[np.int64], Array] | None = None,
+) -> NoiseRows:
+    """Return patches `used` (p,) joined to rows: means weighted by readings, which keeps them linear in the unknowns.
+
+    coarse: what `coarse_of` gives for them, if it is known already.
+    """
+    if not has_path(patches):
         return _without_path(patches, rows, used, prior_sigma)
-    row, info = coarse_of(patches, used)
+    row, info = coarse_of(patches, used) if coarse is None else coarse
     n = len(info)
     picked = np.flatnonzero(used)
     at, weight = row[picked], patches.count[picked]

@@ -7,19 +7,14 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.sparse import csc_array
 
-from alignment.cloud import PointCloud
 from alignment.estimate.cells import Cells
+from alignment.estimate.readings import SORTED_READINGS, Readings
 from alignment.estimate.robust import mad_sigma, tukey_weights
 from alignment.estimate.slices import sum_of_slices
 from planner.frames import Array, Transform
 from planner.surface.curved import CurvedSurface
 from planner.surface.follow import Follower
 
-# Readings that are looked at to find the median of their cell.
-SORTED_READINGS = 150_000
-# Below this share of the usual amplitude a reading counts less: half the beam may be off the part.
-FULL_AMPLITUDE = 0.6
-EVERY = slice(None)
 # The six entries of a symmetric matrix.
 PAIRS = np.triu_indices(3)
 
@@ -31,7 +26,8 @@ class Patches:
     origins_base (p, 3), distance_mm (p,): means. spread (p, 3, 3): covariance of the origins within, mm2. hessian_base
     (p, 3, 3): curvature of the distance to the surface, 1/mm. count (p,): readings it is worth. scatter_mm (p,): their
     standard deviation. amplitude_pct (p,). beams_base (p, 3): zero without beams. cells: where on the path.
-    kept (n,): readings not thrown out as not belonging to their neighbours. sigma_mm: scatter of single readings.
+    looked_at (m,): the readings they were made of, all of the `total` but in very dense scans; kept (m,): those not thrown
+    out as not belonging to their neighbours. sigma_mm: scatter of single readings.
     follower: knows where on the surface the patches were when they were made; tracks: what is known of their residuals.
     """
 
@@ -44,6 +40,8 @@ class Patches:
     amplitude_pct: Array
     beams_base: Array
     cells: Cells
+    looked_at: NDArray[np.int64]
+    total: int
     kept: NDArray[np.bool_]
     sigma_mm: float
     follower: Follower | None = None
@@ -58,66 +56,15 @@ class Patches:
         return 0.5 * np.einsum("pij,pij->p", self.hessian_base, self.spread)
 
 
-def model_readings(cloud: PointCloud, point_model: str, rows: NDArray | slice = EVERY) -> tuple[Array, Array]:
-    """Return (origins (n, 3), distances (n,)) such that distance - dist(origin, surface) is the residual.
-
-    perpendicular: law origins and measured distances. axial (and ready surface points): points, which lie at distance 0.
-    """
-    origins, distance = cloud.origins_base[rows], cloud.distance_mm[rows]
-    if cloud.beams_base is None:
-        return origins, np.zeros(len(origins))
-    if point_model == "axial":
-        return origins + distance[:, None] * cloud.beams_base[rows], np.zeros(len(origins))
-    return origins, distance
-
-
-def reading_weights(cloud: PointCloud, rows: NDArray | slice = EVERY) -> Array:
-    """Return weights (n,) from amplitude: full from 60 % of the median on, falling to zero with it; 1 where unknown.
-
-    Of very many readings the median of a part of them, spread evenly, is taken.
-    """
-    a = cloud.amplitude_pct[rows]
-    # An odd step does not keep to the rhythm of an even number of laws.
-    look = cloud.amplitude_pct[:: (len(cloud) // SORTED_READINGS) | 1]
-    look = look[np.isfinite(look)]
-    usual = float(np.median(look)) if len(look) else 0.0
-    if usual <= 0.0:
-        return np.ones(len(a))
-    weight = a * (1.0 / (FULL_AMPLITUDE * usual))
-    np.clip(weight, 0.0, 1.0, out=weight)
-    weight *= weight
-    weight[np.isnan(weight)] = 1.0
-    return weight
-
-
-def sample_rows(n: int, size: int) -> NDArray[np.int64]:
-    """Return at most `size` row numbers spread over n rows, always the same ones.
-
-    The step is irrational to the rhythm of laws and poses (golden ratio), so that no law is favoured.
-    """
-    if n <= size:
-        return np.arange(n)
-    golden = 0.6180339887498949
-    return np.unique((np.arange(size) + np.modf(np.arange(size) * golden)[0]) * n // size).astype(np.int64)
-
-
-def condense(
-    cloud: PointCloud, cells: Cells, curved: CurvedSurface, T_base_part: Transform, point_model: str
-) -> Patches:
-    """Return the patches of a cloud whose part is already placed to about the robust scatter of the readings.
+def condense(readings: Readings, cells: Cells, curved: CurvedSurface, T_base_part: Transform) -> Patches:
+    """Return the patches of readings in cells, whose part is already placed to about the robust scatter of the readings.
 
     Within a patch the distance to the surface is expanded to second order about the patch's middle, so that the robust
     mean and the rejection see no curvature; the expansion's mean (tr H Cov / 2) is kept and added back exactly. Readings
     are taken a slice at a time, so that what is worked out of them stays in the processor's cache.
     """
     cell, c = cells.of_reading, len(cells)
-
-    def sums(rows: slice) -> Array:
-        origins, _ = model_readings(cloud, point_model, rows)
-        return _sums(cell[rows], c, np.vstack([origins.T, np.ones(len(origins))]))
-
-    total = sum_of_slices(sums, len(cloud), (c, 4))
-    middle = total[:, :3] / np.maximum(total[:, 3:], 1.0)
+    middle = _middles(readings, cell, c)
     follower = Follower(curved, loose=True)
     foot = follower.closest(T_base_part.inv().points(middle))
     hessian = distance_hessian(curved.shape_operator(foot.face, foot.bary), foot.distance_mm)
@@ -125,13 +72,12 @@ def condense(
     hessian = r @ hessian @ r.T
     gradient = T_base_part.directions(foot.normals).T.copy()
     curved_by = (hessian * np.where(np.eye(3, dtype=bool), 0.5, 1.0)).transpose(1, 2, 0).copy()
-    residual = np.zeros(len(cloud))
+    residual = np.zeros(len(readings))
 
     def residuals(rows: slice) -> Array:
-        at = cell[rows]
-        origins, distance = model_readings(cloud, point_model, rows)
+        at, origins = cell[rows], readings.origins_base[rows]
         d = [origins[:, k] - middle[:, k].take(at) for k in range(3)]
-        left = distance - foot.distance_mm.take(at)
+        left = readings.distance_mm[rows] - foot.distance_mm.take(at)
         for i in range(3):
             slope = gradient[i].take(at)
             for j in range(i, 3):
@@ -140,13 +86,22 @@ def condense(
         residual[rows] = left
         return np.zeros(0)
 
-    sum_of_slices(residuals, len(cloud), (0,))
-    weight, sigma = _robust(residual, reading_weights(cloud), cell, c)
-    return _weighted(cloud, cells, middle, residual, weight, sigma, hessian, follower, point_model)
+    sum_of_slices(residuals, len(readings), (0,))
+    weight, sigma = _robust(residual, readings.weight, cell, c)
+    return _weighted(readings, cells, middle, residual, weight, sigma, hessian, follower)
+
+
+def _middles(readings: Readings, cell: NDArray[np.int32], c: int) -> Array:
+    """Return about where each of c cells has its middle (c, 3): the mean of one reading of each of its runs."""
+    start = run_starts(cell)
+    one = (start + np.r_[start[1:], len(readings)]) // 2
+    at, origins = cell[one], readings.origins_base[one]
+    sums = np.stack([np.bincount(at, origins[:, k], c) for k in range(3)], axis=1)
+    return sums / np.maximum(np.bincount(at, minlength=c), 1)[:, None]
 
 
 def _weighted(
-    cloud: PointCloud,
+    readings: Readings,
     cells: Cells,
     middle: Array,
     residual: Array,
@@ -154,28 +109,26 @@ def _weighted(
     sigma_mm: float,
     hessian: Array,
     follower: Follower,
-    point_model: str,
 ) -> Patches:
     """Return the patches as the weighted means of their readings."""
     cell, c = cells.of_reading, len(cells)
 
     def moments(rows: slice) -> Array:
-        at, w = cell[rows], weight[rows]
-        origins, distance = model_readings(cloud, point_model, rows)
+        at, w, origins = cell[rows], weight[rows], readings.origins_base[rows]
         x = np.zeros((18, len(at)))
         for k in range(3):
             np.subtract(origins[:, k], middle[:, k].take(at), out=x[k])
         for k, (i, j) in enumerate(zip(*PAIRS, strict=True)):
             np.multiply(x[i], x[j], out=x[3 + k])
         x[9], x[10] = residual[rows], residual[rows] ** 2
-        x[11], x[12] = distance, np.nan_to_num(cloud.amplitude_pct[rows])
-        if cloud.beams_base is not None:
-            x[13:16] = cloud.beams_base[rows].T
+        x[11], x[12] = readings.distance_mm[rows], np.nan_to_num(readings.amplitude_pct[rows])
+        if readings.beams_base is not None:
+            x[13:16] = readings.beams_base[rows].T
         x[16], x[17] = 1.0, w
         x *= w
         return _sums(at, c, x)
 
-    sums = sum_of_slices(moments, len(cloud), (c, 18))
+    sums = sum_of_slices(moments, len(readings), (c, 18))
     total, squares = sums[:, 16], sums[:, 17]
     mean = sums / np.where(total > 0, total, 1.0)[:, None]
     offset, centre = mean[:, :3], mean[:, 9]
@@ -183,7 +136,7 @@ def _weighted(
     spread[:, PAIRS[0], PAIRS[1]] = spread[:, PAIRS[1], PAIRS[0]] = (
         mean[:, 3:9] - offset[:, PAIRS[0]] * offset[:, PAIRS[1]]
     )
-    heard = bool(np.isfinite(cloud.amplitude_pct).any())
+    heard = bool(np.isfinite(readings.amplitude_pct).any())
     return Patches(
         middle + offset,
         mean[:, 11].copy(),
@@ -194,6 +147,8 @@ def _weighted(
         mean[:, 12].copy() if heard else np.full(c, np.nan),
         mean[:, 13:16].copy(),
         cells,
+        readings.rows,
+        readings.total,
         weight > 0,
         sigma_mm,
         follower,
@@ -202,10 +157,15 @@ def _weighted(
 
 def _sums(cell: NDArray[np.int32], c: int, x: Array) -> Array:
     """Return the sums (c, k) of x (k, m) over cells (m,). Neighbouring readings mostly share a cell: they are summed first."""
-    start = np.flatnonzero(np.r_[True, cell[1:] != cell[:-1]])
+    start = run_starts(cell)
     runs = np.add.reduceat(x, start, axis=1)
     n = len(start)
     return np.asarray(csc_array((np.ones(n), cell[start], np.arange(n + 1, dtype=np.int32)), shape=(c, n)) @ runs.T)
+
+
+def run_starts(cell: NDArray[np.int32]) -> NDArray[np.int64]:
+    """Return where runs of equal numbers begin."""
+    return np.flatnonzero(np.r_[True, cell[1:] != cell[:-1]])
 
 
 def distance_hessian(shape_operator: Array, distance_mm: Array) -> Array:

@@ -45,7 +45,8 @@ def pose_line(cloud: PointCloud, probe: Probe) -> PoseLine:
     present = np.zeros(m, dtype=bool)
     arrays = np.zeros((len(cloud), 3)) if cloud.arrays_base is None else cloud.arrays_base
     last = np.full(m, -1, dtype=np.int64)
-    last[cloud.pose_index] = np.arange(len(cloud))
+    ends = np.flatnonzero(np.r_[cloud.pose_index[1:] != cloud.pose_index[:-1], len(cloud) > 0])
+    last[cloud.pose_index[ends]] = ends
     heard = np.flatnonzero(last >= 0)
     row = last[heard]
     array[heard] = arrays[row]

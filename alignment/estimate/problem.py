@@ -50,7 +50,7 @@ class Problem:
     @cached_property
     def half_size_mm(self) -> float:
         """Half the largest extent of the surface (mm)."""
-        return 0.5 * float(np.ptp(self.curved.surface.vertices, axis=0).max())
+        return 0.5 * float(self.curved.surface.extents_mm.max())
 
     def moves_mm(self, z: Array) -> float:
         """Return about how far (mm) a motion z (6,), in prior standard deviations, moves the surface."""
@@ -59,9 +59,14 @@ class Problem:
 
     def moments_base(self, T_base_part: Transform) -> Array:
         """Return the second area moments (3, 3) of the surface about its centroid, axes of base, mm2."""
-        s = self.curved.surface
         r = T_base_part.rotation_matrix
-        return r @ area_moments(s.vertices, s.faces, s.face_areas_mm2) @ r.T
+        return r @ self.moments_part @ r.T
+
+    @cached_property
+    def moments_part(self) -> Array:
+        """The second area moments (3, 3) of the surface about its centroid, axes of part, mm2."""
+        s = self.curved.surface
+        return area_moments(s.vertices, s.faces, s.face_areas_mm2)
 
     def T_base_basecorr(self, T_base_part: Transform) -> Transform:
         """Return the correction people read."""

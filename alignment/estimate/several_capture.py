@@ -6,8 +6,8 @@ import numpy as np
 
 from alignment.cloud import PointCloud
 from alignment.estimate.capture import CONVEX_STEPS, FLOOR_MM, LEAST_VALID, READING_SIGMA_MM, SAMPLE, STEPS, Captured
-from alignment.estimate.patches import model_readings, reading_weights, sample_rows
 from alignment.estimate.problem import Problem
+from alignment.estimate.readings import model_readings, reading_weights, sample_rows
 from alignment.estimate.robust import huber_weights, mad_sigma, tukey_weights
 from alignment.estimate.several_rows import Member
 from alignment.estimate.surface_rows import Rows, Track

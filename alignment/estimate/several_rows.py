@@ -74,7 +74,8 @@ def joined_patches(members: Sequence[Member], parts: Sequence[Patches], curved: 
     join = lambda values: np.concatenate(list(values))  # noqa: E731
     turned = lambda name: join(t @ getattr(p, name) @ t.T for t, p in zip(turns, parts, strict=True))  # noqa: E731
     both = list(zip(members, parts, strict=True))
-    sizes = np.array([len(p.kept) for p in parts])
+    sizes = np.array([p.total for p in parts])
+    before = np.cumsum(sizes) - sizes
     joined = Patches(
         origins_base=join(m.T_first_own.points(p.origins_base) for m, p in both),
         distance_mm=join(p.distance_mm for p in parts),
@@ -85,6 +86,8 @@ def joined_patches(members: Sequence[Member], parts: Sequence[Patches], curved: 
         amplitude_pct=join(p.amplitude_pct for p in parts),
         beams_base=join(m.T_first_own.directions(p.beams_base) for m, p in both),
         cells=_joined_cells([p.cells for p in parts]),
+        looked_at=join(p.looked_at + n for p, n in zip(parts, before, strict=True)),
+        total=int(sizes.sum()),
         kept=join(p.kept for p in parts),
         sigma_mm=float(np.sqrt(np.average([p.sigma_mm**2 for p in parts], weights=sizes))),
     )

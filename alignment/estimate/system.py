@@ -1,13 +1,14 @@
 """Everything measured, as one linear problem about a placement: patches of the surface, crossings of its edges."""
 
 from dataclasses import dataclass, replace
+from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
 
 from alignment.estimate.edge_points import EdgePoints
 from alignment.estimate.edge_rows import EdgeMap, EdgeRows, edge_rows
-from alignment.estimate.noise_rows import NoiseRows, noise_rows
+from alignment.estimate.noise_rows import NoiseRows, coarse_of, has_path, noise_rows
 from alignment.estimate.patches import Patches
 from alignment.estimate.problem import Problem
 from alignment.estimate.surface_rows import Rows, patch_rows
@@ -83,6 +84,10 @@ class System:
         """6, or 9 with edges."""
         return 6 if self.edges is None else 6 + NUISANCES
 
+    @cached_property
+    def _coarse(self) -> tuple[NDArray[np.int64], Array] | None:
+        return coarse_of(self.patches, self.used) if has_path(self.patches) else None
+
     def surface(self, T_base_part: Transform) -> Rows:
         """Return the residuals of all patches."""
         p = self.problem
@@ -92,7 +97,7 @@ class System:
         """Return the condensed rows at a placement, with the edges' nuisances as they stand (3,), in their sigmas."""
         p = self.problem
         swath = p.setup.probe.swath_mm
-        surface = noise_rows(self.patches, self.surface(T_base_part), self.used, p.prior_sigma, swath)
+        surface = noise_rows(self.patches, self.surface(T_base_part), self.used, p.prior_sigma, swath, self._coarse)
         if self.edges is None:
             return surface
         found = self.edges.rows(p, T_base_part)

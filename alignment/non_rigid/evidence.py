@@ -6,7 +6,7 @@ import numpy as np
 from scipy.linalg import cho_factor, cho_solve
 from scipy.optimize import minimize
 
-from alignment.estimate.noise_fit import noise_prior
+from alignment.estimate.noise_prior import noise_prior
 from alignment.non_rigid.covariance import ACROSS, ALONG, FIELD, NOISE, NodeCovariance, surface_axes
 from alignment.non_rigid.nodes import Nodes
 from planner.frames import Array

@@ -65,6 +65,10 @@ class CurvedSurface:
         own |= len(self._faces) != len(part.faces)
         return Triangles(self._vertices, self._faces, boxes=None if own else lambda: solid_of(part).tree)
 
+    def get_ready(self) -> None:
+        """Work out beforehand what the first question about a foot would have to wait for."""
+        _ = self._at_rim
+
     @cached_property
     def _edges(self) -> Edges:
         return edges_of(self._welded_faces)

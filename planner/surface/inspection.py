@@ -42,6 +42,11 @@ class InspectionSurface:
         """Triangles (k, 3) into `vertices`; row i is `part.faces[part_faces[i]]`."""
         return self._compact[1]
 
+    @cached_property
+    def extents_mm(self) -> Array:
+        """Size along x, y, z of part (mm)."""
+        return np.asarray(np.ptp(np.ascontiguousarray(self.vertices.T), axis=1))
+
     @property
     def face_normals(self) -> Array:
         """Unit outward normals (k, 3)."""
@@ -60,8 +65,10 @@ class InspectionSurface:
     @cached_property
     def centroid_part(self) -> Array:
         """Area centroid (3,), mm."""
-        share = self.face_areas_mm2 / self.area_mm2
-        return np.asarray(sum((share @ self.vertices[corner] for corner in self.faces.T), np.zeros(3)) / 3.0)
+        # Each vertex has a third of the area of the triangles around it.
+        area = np.repeat(self.face_areas_mm2, 3)
+        weight = np.bincount(self.faces.ravel(), area, len(self.vertices))
+        return np.asarray(weight @ self.vertices / (3.0 * self.area_mm2))
 
     @cached_property
     def mean_normal_part(self) -> Array:

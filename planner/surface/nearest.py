@@ -162,14 +162,21 @@ class Triangles:
         a, b, c = self._corner_columns
         longest = np.zeros(len(self.faces))
         for p, q in ((a, b), (b, c), (c, a)):
-            step2 = sum(((x[p] - x[q]) ** 2 for x in self._columns), np.zeros(len(p)))
+            step2 = np.zeros(len(p))
+            for x in self._columns:
+                step = x.take(p) - x.take(q)
+                step2 += np.multiply(step, step, out=step)
             np.maximum(longest, step2, out=longest)
         return np.sqrt(longest)
 
     @cached_property
+    def _usual_mm(self) -> float:
+        return float(np.median(self._longest_mm))
+
+    @cached_property
     def _long(self) -> NDArray[np.int64]:
         """Faces that are much longer than usual."""
-        return np.flatnonzero(self._longest_mm > LONG_EDGE * np.median(self._longest_mm))
+        return np.flatnonzero(self._longest_mm > LONG_EDGE * self._usual_mm)
 
     @cached_property
     def _long_boxes(self) -> igl.AABB:
@@ -180,8 +187,7 @@ class Triangles:
     @cached_property
     def _rho_mm(self) -> float:
         """How far a point of a triangle that is not long can be from its nearest corner."""
-        usual = float(LONG_EDGE * np.median(self._longest_mm))
-        return min(usual, float(self._longest_mm.max())) / np.sqrt(3.0) * (1.0 + 1e-9)
+        return min(LONG_EDGE * self._usual_mm, float(self._longest_mm.max())) / np.sqrt(3.0) * (1.0 + 1e-9)
 
     @cached_property
     def _fans(self) -> tuple[NDArray[np.int64], NDArray[np.int64]]:

@@ -49,11 +49,11 @@ def edges_of(faces: Index) -> Edges:
     uses = np.diff(np.r_[starts, len(ordered)])
     edge_of = np.zeros(len(key), dtype=np.int64)
     edge_of[order] = np.repeat(np.arange(len(starts)), uses)
-    first = order[starts] // 3
+    one = order[starts]
+    first = one // 3
     second = np.where(uses > 1, order[np.minimum(starts + 1, max(len(order) - 1, 0))] // 3, -1)
-    unique = ordered[starts]
     return Edges(
-        np.stack([unique // span, unique % span], axis=1),
+        np.stack([low.take(one), high.take(one)], axis=1),
         edge_of.reshape(-1, 3),
         (start == low).reshape(-1, 3),
         uses,

@@ -21,21 +21,21 @@ def rows(from_mm, to_mm, passes) -> NoiseRows:
 def test_the_way_between_passes_is_as_long_as_the_data_say(way_mm):
     """Points (stretches of no length) at 0 and 10 mm of one pass and, after some way, at its start of the next."""
     at = np.array([0.0, 10.0, 10.0 + way_mm])
-    found = Kernel(rows(at, at, [0, 0, 1])).path_correlation(30.0, 7.0)
+    found = Kernel(rows(at, at, [0, 0, 1])).block_correlation(30.0, 7.0)
     apart = np.array([[0, 10, 17], [10, 0, 7], [17, 7, 0]])
     assert np.allclose(found, np.exp(-apart / 30.0), rtol=1e-6)
 
 
 def test_another_scan_shares_nothing():
     at = np.array([0.0, 10.0, 10.0 + 1e4])
-    found = Kernel(rows(at, at, [0, 0, 1])).path_correlation(150.0, 7.0)
+    found = Kernel(rows(at, at, [0, 0, 1])).block_correlation(150.0, 7.0)
     assert found[0, 1] == pytest.approx(np.exp(-10 / 150))
     assert np.abs(found[:2, 2]).max() < 1e-9
 
 
 def test_means_over_stretches_against_sums_of_the_process():
     ends = np.array([[0.0, 8.0], [8.0, 16.0], [30.0, 38.0]])
-    found = Kernel(rows(ends[:, 0], ends[:, 1], [0, 0, 0])).path_correlation(5.0, 7.0)
+    found = Kernel(rows(ends[:, 0], ends[:, 1], [0, 0, 0])).block_correlation(5.0, 7.0)
     s = np.linspace(0, 8, 2001)[:-1] + 0.002
     t = ends[:, :1] + s
     wanted = np.array([[np.exp(-np.abs(a[:, None] - b[None, :]) / 5.0).mean() for b in t] for a in t])
