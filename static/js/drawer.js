@@ -31,7 +31,7 @@ export class Drawer {
     this.node.classList.toggle("hidden", !tab);
     this.node.classList.toggle("closed", !shown);
     fill(this.strip, this.tabs.map((t) => h("button", { type: "button", class: "tab", role: "tab", "aria-selected": String(t === tab && this.open), onclick: () => this.choose(t) }, t.title)),
-      h("span", { style: { flex: "1" } }), tab && h("button", { type: "button", class: "tab", onclick: () => { this.open = !this.open; this.draw(); } }, this.open ? "Hide" : "Show"));
+      tab && h("button", { type: "button", class: "tab end", onclick: () => { this.open = !this.open; this.draw(); } }, this.open ? "Hide" : "Show"));
     if (!shown) return;
     const token = (this.token = {});
     const place = `${this.step} ${tab.key}`;

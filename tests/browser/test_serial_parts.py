@@ -5,6 +5,8 @@ import pytest
 from tests.browser.eyes import Watch, until
 from tests.browser.real_server import RealServer
 
+# Tabs of the step Alignment with a table, and a word of each.
+TABLES = {"Key points": "matched", "Directions": "measured", "All alignments": "MAP", "Batch": "common"}
 pytestmark = [pytest.mark.browser, pytest.mark.slow, pytest.mark.timeout(600)]
 KEYS = ("x_mm", "y_mm", "z_mm", "a_deg", "b_deg", "c_deg")
 OFFSETS = ((1.1, -0.7, 1.0, 0.2, -0.8, 0.5), (1.2, -0.5, 0.9, 0.22, -0.75, 0.45), (0.9, -0.9, 1.1, 0.15, -0.8, 0.5))
@@ -41,8 +43,18 @@ def test_parts_are_compared_and_can_be_left_out(server, chromium):
     assert table.locator("svg.strip circle").count() == 3 * len(said["directions"])
     tabs = page.locator(".drawer .tabs .tab")
     assert len({round(tabs.nth(i).bounding_box()["height"]) for i in range(tabs.count())}) == 1
-    # Everything is in sight without scrolling sideways.
-    assert page.locator(".drawer .body").evaluate("n => n.scrollWidth - n.clientWidth") <= 1
+    # Everything is in sight without scrolling sideways, in a narrow window too.
+    for width in (1024, 1440, 1280):
+        page.set_viewport_size({"width": width, "height": 800})
+        for name, word in TABLES.items():
+            page.get_by_role("tab", name=name, exact=True).click()
+            page.locator(".drawer .body", has_text=word).wait_for()
+            assert page.locator(".drawer .body").evaluate("n => n.scrollWidth - n.clientWidth") <= 0, (width, name)
+    hide = page.locator(".drawer .tabs .end").bounding_box()
+    assert (
+        hide["x"] + hide["width"]
+        <= page.locator(".drawer").bounding_box()["x"] + page.locator(".drawer").bounding_box()["width"]
+    )
     page.locator("input[name='part-2']").uncheck()
     page.locator(".drawer th", has_text="2 parts").wait_for()
     assert "not told" in table.locator("tr", has_text="scatter").first.inner_text()

@@ -45,13 +45,14 @@ export function baseFit(body, fit, project, placement, use) {
   };
   const input = (row, column) => h("input", { type: "number", step: "any", name: `pair-${row}-${column}`, "aria-label": `Pair ${row + 1}, ${column < 3 ? "CAD" : "touched"} ${XYZ[column % 3].toUpperCase()} (mm)`, value: fit.pairs[row][column], oninput: (e) => { change(row, column, e.target.value); go.disabled = fit.pairs.filter(filled).length < LEAST; }, onpaste: (e) => paste(e, row, column) });
   const pairs = fit.pairs.map((pair, row) => h("tr", {}, h("td", { class: "l" }, String(row + 1)), pair.map((_, column) => h("td", {}, input(row, column))),
-    h("td", { class: "num" }, mm(fit.answer?.pairs[row]?.residual_mm)), h("td", { class: "num" }, mm(fit.answer?.pairs[row]?.left_out_mm)),
+    fit.answer && [h("td", { class: "num" }, mm(fit.answer.pairs[row]?.residual_mm)), h("td", { class: "num" }, mm(fit.answer.pairs[row]?.left_out_mm))],
     h("td", {}, button("✕", () => { fit.pairs.splice(row, 1); fit.answer = null; again(); }, { class: "ghost tiny", "aria-label": `Delete pair ${row + 1}`, disabled: fit.pairs.length <= 1, key: `pair-del-${row}` }))));
   const go = button("Fit BASE", run, { class: "primary", disabled: ready < LEAST, key: "fit-base" });
-  const titles = ["Pair", "CAD X, mm", "CAD Y", "CAD Z", "Touched X", "Touched Y", "Touched Z", "Residual", "Left out", ""];
+  const found = [["Residual", "Distance to the place that all pairs give, mm"], ["Left out", "Distance to the place that the other pairs give, mm"]];
+  const titles = [["", "Pair"], ...["CAD", "Touched"].flatMap((of) => XYZ.map((axis) => [`${of} ${axis.toUpperCase()}`, "mm"])), ...(fit.answer ? found : []), [""]];
   fill(body, h("div", { class: "fit" },
-    h("div", { class: "stack" }, h("p", { class: "soft small" }, "Touch three or more points with a calibrated spike. Type where they are on the CAD, and where the pendant says they are in WORLD (BASE 0). Blocks of numbers can be pasted."),
-      h("table", { class: "pairs" }, h("thead", {}, h("tr", {}, titles.map((t, i) => h("th", { class: i === 0 ? "l" : null, scope: "col", title: t.startsWith("Left out") ? "Distance to the place that the other pairs give" : null }, t)))), h("tbody", {}, pairs)),
+    h("div", { class: "stack" }, h("p", { class: "soft small" }, "Touch three or more points with a calibrated spike. Type where they are on the CAD, and where the pendant says they are in WORLD (BASE 0), in mm. Blocks of numbers can be pasted."),
+      h("table", { class: "pairs" }, h("thead", {}, h("tr", {}, titles.map(([text, why], i) => h("th", { class: i === 0 ? "l" : i > 6 && text ? "found" : null, scope: "col", title: why }, text)))), h("tbody", {}, pairs)),
       h("div", { class: "row" }, button("Add a pair", () => { fit.pairs.push(EMPTY()); again(); }), go)),
     h("div", { class: "stack" }, issueList(fit.issues), fit.answer && fitted(fit.answer, use))));
 }

@@ -25,12 +25,14 @@ export async function batch(body, alive, shell, list, local) {
   let refusal = "";
   // Once its patch is in force, the alignments are of the cell before: what was shown then stays, to be taken back.
   const used = inForce(shell, local);
-  let found = used ? local.found : null;
-  if (!used && numbers.length > 1) {
+  // While it is being put in force or taken back, a question asked now could be answered of either cell.
+  const kept = used || Boolean(local.use?.saving);
+  let found = kept ? local.found : null;
+  if (!kept && numbers.length > 1) {
     try { found = await get(`${path}/batch?${numbers.map((n) => `alignments=${n}`).join("&")}`); } catch (error) { refusal = error.message; }
   }
   if (!alive()) return;
-  if (found && !used) remember(local, found, etagOf(`${path}/setup`) === `"${found.setup_version}"` ? JSON.stringify(data.setup) : null);
+  if (found && !kept) remember(local, found, etagOf(`${path}/setup`) === `"${found.setup_version}"` ? JSON.stringify(data.setup) : null);
   const again = () => { if (shell.step === "alignment") shell.drawer.draw(); };
   const toggle = (n) => { if (!local.chosen.delete(n)) local.chosen.add(n); again(); };
   const boxes = h("div", { class: "row tight" }, h("span", { class: "soft small" }, "Parts:"), list.map((a) => h("label", { class: "row tight" },
