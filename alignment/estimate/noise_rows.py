@@ -13,6 +13,8 @@ TARGET_ROWS = 200
 MOST_BANDS = 3
 # Rows that are too many stand for so many times longer stretches, on average.
 LONGER = 1.15
+# Of a shape, stretches are not made longer than so many cells while a third band of laws is left.
+LONG_STRETCH = 4.0
 
 
 @dataclass(frozen=True, eq=False)
@@ -52,10 +54,13 @@ def has_path(patches: Patches) -> bool:
     return not bool(np.isnan(patches.cells.s_from_mm).all())
 
 
-def coarse_of(patches: Patches, used: NDArray[np.bool_], target: int = TARGET_ROWS) -> tuple[NDArray[np.int64], Array]:
+def coarse_of(
+    patches: Patches, used: NDArray[np.bool_], target: int = TARGET_ROWS, of_shape: bool = False
+) -> tuple[NDArray[np.int64], Array]:
     """Return the row (p,) of each used patch (-1: unused) and [from, to, pass, band] per row (n, 4).
 
-    Neighbouring stretches of a pass and neighbouring bands of laws are joined until there are few enough rows.
+    Neighbouring stretches of a pass and neighbouring bands of laws are joined until there are few enough rows. of_shape: the
+    rows are to show a part's shape, across the laws as well as along the pass.
     """
     cells = patches.cells
     pass_number = np.unique(cells.pass_id, return_inverse=True)[1]
@@ -65,7 +70,7 @@ def coarse_of(patches: Patches, used: NDArray[np.bool_], target: int = TARGET_RO
     within = cells.block - low[pass_number]
     bands = np.unique(np.round(cells.across_mm, 6), return_inverse=True)[1]
     band_count = 1 + int(bands.max(initial=0))
-    for join, merged in _joins(int(within.max(initial=0)) + 1, min(band_count, MOST_BANDS)):
+    for join, merged in _joins(int(within.max(initial=0)) + 1, min(band_count, MOST_BANDS), of_shape):
         band = bands * merged // band_count
         stretch = (within / join).astype(np.int64)
         per_pass = 1 + int(stretch.max(initial=0))
@@ -83,15 +88,19 @@ def coarse_of(patches: Patches, used: NDArray[np.bool_], target: int = TARGET_RO
     return row, np.column_stack([s_from, s_to, number // per_pass, number])
 
 
-def _joins(longest: int, bands: int) -> list[tuple[float, int]]:
+def _joins(longest: int, bands: int, of_shape: bool) -> list[tuple[float, int]]:
     """Return ways to join, from fine to coarse: so many stretches to one, and into how many bands of laws.
 
     Two bands still show an array that tilts; shorter stretches say more of a robot that wanders than a third band does.
     """
+    fewer = min(bands, 2)
     joins = [1.0]
     while joins[-1] < longest:
-        joins.append(LONGER * joins[-1])
-    ways = {(join, merged) for join in joins for merged in {bands, min(bands, 2)}}
+        # Nodes of a shape stay whole cells wide, so that they lie evenly.
+        joins.append(max(joins[-1] + 1.0, round(1.3 * joins[-1])) if of_shape else LONGER * joins[-1])
+    if of_shape:
+        return [(join, bands if join <= LONG_STRETCH else fewer) for join in joins]
+    ways = {(join, merged) for join in joins for merged in {bands, fewer}}
     return sorted(ways, key=lambda way: way[0] / way[1])
 
 

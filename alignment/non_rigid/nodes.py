@@ -108,7 +108,7 @@ def gather(
     cells = patches.cells
     with_path = not np.isnan(cells.s_from_mm).all()
     if with_path:
-        row, info = coarse_of(patches, keep, most)
+        row, info = coarse_of(patches, keep, most, of_shape=True)
         at, n = row[picked], len(info)
         _, first, block = np.unique(info[:, 3], return_index=True, return_inverse=True)
         s_from, s_to = np.full(len(first), np.inf), np.full(len(first), -np.inf)
