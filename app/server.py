@@ -41,6 +41,7 @@ from app.jobs.dask_slot import DaskSlot, connect
 from app.jobs.runner import JobRunner
 from app.jobs.slot import ProcessSlot, Slot
 from app.jobs.thinker import Thinker
+from app.scratch import temporary_files_in
 from app.security import Guard
 from app.settings import ServerSettings
 from app.store.projects import get
@@ -226,7 +227,8 @@ def serve(host: str | None = None, port: int | None = None, data: Path | None = 
     )
     sys.stdout.flush()
     server = _Server(config)
-    server.run(sockets=[listener])
+    with temporary_files_in(settings.scratch()):
+        server.run(sockets=[listener])
     return 0 if server.started else 1
 
 

@@ -69,6 +69,10 @@ class ServerSettings(BaseSettings):
         """True if only this machine can reach the server."""
         return self.host in LOOPBACK
 
+    def scratch(self) -> Path:
+        """Return the folder of temporary files: only the server that holds the data folder uses it."""
+        return self.data.resolve() / "tmp"
+
     def database_url(self) -> str:
         """Return the URL of the database."""
         return self.db or f"sqlite:///{self.data.resolve() / 'echobase.db'}"

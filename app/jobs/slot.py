@@ -4,6 +4,7 @@ import contextlib
 import json
 import multiprocessing
 import os
+import shutil
 import signal
 import tempfile
 import threading
@@ -14,6 +15,7 @@ from typing import Protocol
 
 from app.jobs.execute import execute
 from app.jobs.payload import Cancelled, Outcome, Payload, Report
+from app.scratch import clear
 
 POSIX = os.name == "posix"
 CONTEXT = multiprocessing.get_context("forkserver" if POSIX else "spawn")
@@ -44,10 +46,11 @@ class Slot(Protocol):
 
 
 class ProcessSlot:
-    """A slot on this machine: one process, kept warm between jobs; progress and the wish to stop pass through two files."""
+    """A slot on this machine: one process, kept warm between jobs; progress and the wish to stop are two files."""
 
     def __init__(self) -> None:
         self._folder = Path(tempfile.mkdtemp(prefix="echobase-slot-"))
+        self._work = self._folder / "work"
         self._pool: ProcessPoolExecutor | None = None
 
     def warm(self) -> None:
@@ -57,7 +60,7 @@ class ProcessSlot:
 
     def _ready(self) -> ProcessPoolExecutor:
         if self._pool is None:
-            self._pool = ProcessPoolExecutor(1, CONTEXT, begin_worker)
+            self._pool = ProcessPoolExecutor(1, CONTEXT, begin_worker, (str(self._work),))
         return self._pool
 
     def submit(self, payload: Payload) -> "Future[Outcome]":
@@ -89,18 +92,22 @@ class ProcessSlot:
                 else:
                     process.kill()
         pool.shutdown(wait=True, cancel_futures=True)
+        clear(self._work)
 
     def close(self) -> None:
         """End the process and remove its files."""
         self.kill()
-        for name in ("report", "report.new", "stop"):
-            (self._folder / name).unlink(missing_ok=True)
-        with contextlib.suppress(OSError):
-            self._folder.rmdir()
+        shutil.rmtree(self._folder, ignore_errors=True)
 
 
-def begin_worker() -> None:
-    """Prepare a new worker: a process group of its own, and an end when the server ends, however that happens."""
+def begin_worker(work: str | None = None) -> None:
+    """Prepare a new worker: a process group of its own, and an end when the server ends, however that happens.
+
+    What it makes in passing goes into the folder `work`, if one is named: whoever kills it can then clear that.
+    """
+    if work is not None:
+        Path(work).mkdir(parents=True, exist_ok=True)
+        os.environ["TMPDIR"], tempfile.tempdir = work, None
     if POSIX:
         os.setsid()
         signal.signal(signal.SIGINT, signal.SIG_IGN)

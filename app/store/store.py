@@ -10,6 +10,7 @@ from importlib.metadata import version
 from pathlib import Path
 from typing import IO, Any
 
+from app.scratch import clear
 from app.settings import ServerSettings
 from app.store.blobs import BlobStore, BlobWriter, open_blobs
 from app.store.database import Database
@@ -95,6 +96,8 @@ def open_store(settings: ServerSettings) -> Store:
     """Open the store: lock it, migrate it, and remove what a killed server left half-done."""
     settings.data.mkdir(parents=True, exist_ok=True)
     lock = _lock(settings.data)
+    if lock:
+        clear(settings.scratch())
     db = Database(settings.database_url())
     db.migrate()
     blobs = open_blobs(settings.store_url())
