@@ -5,12 +5,15 @@ interpreter with limits on memory, time and file size, no core dump and a privat
 read without pickle, the rest as JSON.
 """
 
+import contextlib
 import json
 import os
 import signal
 import subprocess
 import sys
 import tempfile
+import threading
+import time
 from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import Any
@@ -22,6 +25,7 @@ from planner.errors import EchoBaseError, fail
 from planner.issues import Issue
 
 CONSOLE_BYTES = 20_000
+STOP_WITHIN_S = 0.1
 ROOT = Path(__file__).resolve().parents[1]
 # Libraries of the child that start a thread for every core, each with its own arena, run into the memory limit.
 THREADS = dict.fromkeys(("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS"), "1") | {
@@ -41,12 +45,17 @@ class SandboxLimits:
 
 
 def run_limited(
-    target: str, source: Path, options: dict[str, Any], limits: SandboxLimits | None = None
+    target: str,
+    source: Path,
+    options: dict[str, Any],
+    limits: SandboxLimits | None = None,
+    stop: threading.Event | None = None,
 ) -> tuple[dict[str, NDArray[Any]], dict[str, Any]]:
     """Return `(arrays, meta)` of `target` called with a file and JSON-able options, in a child process.
 
     `meta["console"]` is what the reader and its libraries wrote to standard output and error (at most 20 kB).
-    Raises EchoBaseError: the child's own issues; or `reader-memory`, `reader-time`, `reader-crash`, `reader-failed`.
+    Raises EchoBaseError: the child's own issues; or `reader-memory`, `reader-time`, `reader-crash`, `reader-failed`;
+    `reader-stopped` if somebody set `stop` meanwhile: the child is then ended at once.
     Safe to call from threads, pool workers and servers: nothing is forked, no main module is run again.
     """
     limits = limits or SandboxLimits()
@@ -55,7 +64,9 @@ def run_limited(
         work = Path(folder)
         request = {"target": target, "source": str(source), "options": options, "limits": asdict(limits)}
         (work / "request.json").write_text(json.dumps(request), encoding="utf-8")
-        code = _run_child(work, limits.wall_s)
+        code = _run_child(work, limits.wall_s, stop)
+        if code is None and stop is not None and stop.is_set():
+            raise fail("reader-stopped", "Reading the file was stopped.", "Start it again.", source.name)
         console = _console(work)
         if code is None:
             raise _too_slow(source, f"{limits.wall_s:g} s")
@@ -74,8 +85,8 @@ def run_limited(
         return arrays, outcome["meta"] | {"console": console}
 
 
-def _run_child(work: Path, wall_s: float) -> int | None:
-    """Run the child to its end and return its exit code (negative: a signal); None if it ran out of wall time."""
+def _run_child(work: Path, wall_s: float, stop: threading.Event | None) -> int | None:
+    """Run the child to its end and return its exit code (negative: a signal); None if it was stopped or ran out of time."""
     path = os.pathsep.join([str(ROOT), *(p for p in sys.path if p)])
     environment = os.environ | THREADS | {"PYTHONPATH": path, "TMPDIR": str(work), "PYTHONDONTWRITEBYTECODE": "1"}
     command = [sys.executable, "-X", "utf8", "-m", "planner.sandbox_child", str(work)]
@@ -89,9 +100,11 @@ def _run_child(work: Path, wall_s: float) -> int | None:
             env=environment,
             start_new_session=True,
         )
+    deadline = time.monotonic() + wall_s
     try:
-        return child.wait(timeout=wall_s)
-    except subprocess.TimeoutExpired:
+        while (left := deadline - time.monotonic()) > 0.0 and not (stop is not None and stop.is_set()):
+            with contextlib.suppress(subprocess.TimeoutExpired):
+                return child.wait(timeout=left if stop is None else min(left, STOP_WITHIN_S))
         return None
     finally:
         if child.poll() is None:

@@ -15,6 +15,7 @@ from app.api.calibration_models import CalibrationInfo, Kind, Target, calibratio
 from app.api.context import Context, Ctx, Number, ProjectId
 from app.api.downloads import streamed
 from app.api.errors import documented
+from app.api.hangup import while_awaited
 from app.api.receive import Received, receive
 from app.api.upload_body import choice, upload_body
 from app.api.upload_body import files as several
@@ -26,7 +27,7 @@ from app.store.names import safe_member
 from app.store.refusal import not_found, refuse
 from app.store.tables import ResultRow
 from planner.errors import EchoBaseError, fail
-from planner.sandbox import run_limited
+from planner.sandbox import STOP_WITHIN_S, run_limited
 from planner.setup import Setup
 
 router = APIRouter(prefix="/projects/{project_id}/calibrations", tags=["inputs"])
@@ -67,7 +68,7 @@ async def calibrate(
     """Calibrate tilt loss, couplant or TCP from measurements, with the setup in force.
 
     What was found is kept as a result with its readings and report; nothing is put in force. The same files in the same
-    setup are the same calibration.
+    setup are the same calibration. A client that hangs up ends the work; nothing is kept of it then.
     """
     try:
         with tempfile.TemporaryDirectory(prefix="echobase-calibrate-") as folder, ctx.store.busy():
@@ -78,7 +79,9 @@ async def calibrate(
                 "target": _target(received.fields.get("target")) or target or "plane",
                 "radius_mm": _radius(received.fields.get("radius_mm")) or radius_mm,
             }
-            answer, is_new = await asyncio.to_thread(_made, ctx, project_id, cell, received, options, Path(folder))
+            answer, is_new = await while_awaited(
+                request, lambda stop: _made(ctx, project_id, cell, received, options, Path(folder), stop)
+            )
     finally:
         # Readings of a calibration that was refused are named by no row: they go.
         await asyncio.to_thread(ctx.store.tidy)
@@ -142,7 +145,13 @@ def _cell(ctx: Context, project_id: str) -> kept.Cell:
 
 
 def _made(
-    ctx: Context, project_id: str, cell: kept.Cell, received: Received, options: dict[str, Any], folder: Path
+    ctx: Context,
+    project_id: str,
+    cell: kept.Cell,
+    received: Received,
+    options: dict[str, Any],
+    folder: Path,
+    stop: threading.Event,
 ) -> tuple[CalibrationInfo, bool]:
     """Return the calibration of what came, and whether it is new; the blobs that came are held by the caller."""
     made_from = kept.inputs_of(cell, received.files)
@@ -152,10 +161,12 @@ def _made(
     setup = Setup.model_validate(cell.setup).model_dump(mode="json")
     names = [shown for shown, _ in received.files]
     files = _lay_out(ctx, received, folder)
-    found = _in_child(folder, {**options, "setup": setup, "names": names, "files": files})
+    found = _in_child(folder, {**options, "setup": setup, "names": names, "files": files}, stop)
     blobs = {name: put_bytes(ctx.store.blobs, base64.b64decode(text)) for name, text in found.pop("files").items()}
     for place, (shown, blob) in enumerate(received.files, start=1):
         blobs[f"{kept.READINGS}/{place}-{safe_member(shown)}"] = blob
+    if stop.is_set():
+        raise _stopped()
     with ctx.store.db.write() as session:
         projects.get(session, project_id)
         row = kept.same(session, project_id, made_from, options)
@@ -174,18 +185,28 @@ def _lay_out(ctx: Context, received: Received, folder: Path) -> list[str]:
     return files
 
 
-def _in_child(folder: Path, options: dict[str, Any]) -> dict[str, Any]:
+def _stopped() -> EchoBaseError:
+    return fail("calibration-stopped", "The calibration was stopped; nothing was kept.", "Send the files again.", "")
+
+
+def _in_child(folder: Path, options: dict[str, Any], stop: threading.Event) -> dict[str, Any]:
+    while not _AT_ONCE.acquire(timeout=STOP_WITHIN_S):
+        if stop.is_set():
+            raise _stopped()
     try:
-        with _AT_ONCE:
-            _, found = run_limited(CHILD, folder, options)
+        _, found = run_limited(CHILD, folder, options, stop=stop)
     except EchoBaseError as error:
         issue = error.issues[0]
+        if stop.is_set():
+            raise _stopped() from error
         if issue.where != folder.name:
             raise
         # It was not a file that could not be read: the calibration as a whole ended without an answer.
         text, remedy = ENDED.get(issue.code, ENDED["reader-crash"])
         code = issue.code.replace("reader", "calibration")
         raise fail(code, text, remedy, " + ".join(options["names"])) from error
+    finally:
+        _AT_ONCE.release()
     found.pop("console")
     return found
 

@@ -1,8 +1,12 @@
 """A calibration in the page: files in, values and curve seen, the patch put in force and taken back."""
 
+import os
+import signal
+
 import pytest
 
 from tests.api.test_calibrations import couplant_csv, tilt_csv
+from tests.api.test_hangup import calibrating
 from tests.browser.eyes import Watch, until
 from tests.browser.real_server import RealServer
 
@@ -95,3 +99,25 @@ def test_calibrate_see_use_and_undo(server, chromium, tmp_path):
     assert [c for c in page.watch.complaints if refused not in c] == []
     assert page.watch.foreign == []
     context.close()
+
+
+def test_cancel_ends_the_work_and_keeps_nothing(server, chromium):
+    pid = server.rest("/projects", "POST", {"name": "Impatient"})["id"]
+    page = chromium.new_page(viewport={"width": 1024, "height": 768})
+    page.watch = Watch(server.url).on(page)
+    page.goto(f"{server.url}/#/p/{pid}/cell")
+    page.locator('[data-key="group-probe"]').click()
+    page.locator('[data-key="calibrate-probe"]').click()
+    give(page, "tilt.csv", tilt_csv())
+    until(page, lambda: calibrating(server.process.pid), what="the calibration")
+    # Held, it would be there for ever.
+    for child in calibrating(server.process.pid):
+        os.kill(child, signal.SIGSTOP)
+    page.locator('[data-key="calibration-cancel"]').click()
+    page.locator(".calibrate .issue", has_text="The calibration was cancelled; nothing was kept.").wait_for()
+    until(page, lambda: not calibrating(server.process.pid), what="the end of the work")
+    assert server.rest(f"/projects/{pid}/calibrations") == []
+    # The tab is ready for other readings.
+    page.locator('[data-key="calibration-choose"]').wait_for()
+    assert page.watch.complaints == []
+    page.close()

@@ -97,7 +97,9 @@ async function send(shell, cal, files, again) {
     await project.load(["setup", "calibrations"]);
     await pick(shell, cal, answer, again);
   } catch (error) {
-    cal.issues = error.issues ?? [{ severity: "error", code: "fault", message: error.message, remedy: "", where: "" }];
+    // The server ends the work when the page hangs up.
+    const stopped = error.issues?.[0]?.code === "upload-cancelled";
+    cal.issues = stopped ? [{ severity: "info", code: "cancelled", message: "The calibration was cancelled; nothing was kept.", remedy: "", where: "" }] : error.issues ?? [{ severity: "error", code: "fault", message: error.message, remedy: "", where: "" }];
   } finally {
     cal.progress = null;
     again();
