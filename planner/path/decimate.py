@@ -7,7 +7,7 @@ import numpy as np
 from planner.errors import fail
 from planner.frames import Array
 from planner.path.isolines import Ints
-from planner.path.knots import Blocks, Knots, blocks_of, knots_at, placed, with_knots
+from planner.path.knots import ALIKE_MM, ALIKE_RAD, Blocks, Knots, blocks_of, knots_at, placed, with_knots
 from planner.path.spline import chord_deviation, spline_deviation
 from planner.toolpath import ToolPath
 
@@ -96,17 +96,22 @@ def deviation(dense: ToolPath, sparse: ToolPath) -> tuple[float, float, float, f
     b = blocks_of(dense)
     knots = placed(b, blocks_of(sparse))
     interval = _interval_of(b, knots)
-    best = [(np.full(len(b.s), np.inf), np.zeros(len(b.s))) for _ in range(3)]
-    # Where a pose bulges from the dense polyline its place on it is not exact: neighbouring intervals are looked at as well.
+    best = [(np.full(len(b.s), np.inf), np.full(len(b.s), np.inf)) for _ in range(3)]
+    # Where a pose bulges from the dense polyline, or the TCP backs in a kink, its place on it is not exact: neighbouring
+    # intervals are looked at as well. Of two places, the better is the one from which place and turn together are nearer.
     for aside in (0, -1, 1):
         beside = np.clip(interval + aside, 0, len(knots) - 2)
         beside = np.where((knots.block[beside] == b.block) & (knots.block[beside + 1] == b.block), beside, interval)
         for k, (mm, rad) in enumerate(_readings(b, knots, beside)):
-            less = mm < best[k][0] - 1e-9
+            less = _off(mm, rad) < _off(*best[k]) - 1e-9
             best[k] = np.where(less, mm, best[k][0]), np.where(less, rad, best[k][1])
     away = [float(mm.max(initial=0.0)) for mm, _ in best]
     turned = [float(np.degrees(rad.max(initial=0.0))) for _, rad in best]
     return away[0], turned[0], max(away[1:]), max(turned[1:])
+
+
+def _off(mm: Array, rad: Array) -> Array:
+    return np.maximum(mm / ALIKE_MM, rad / ALIKE_RAD)
 
 
 def _readings(b: Blocks, knots: Knots, interval: Ints) -> list[tuple[Array, Array]]:

@@ -13,6 +13,8 @@ from planner.toolpath import Role, ToolPath, contact_to_tcp
 BLOCK_ROLES = (Role.LEAD_IN, Role.DATA, Role.LEAD_OUT)
 # How far the bends at two neighbouring poses may put the middle between them apart.
 UNSURE_MM, UNSURE_RAD = 0.005, np.radians(0.01)
+# A distance and a turn that count alike where a place on the motion is sought: the tolerances of `decimate` by default.
+ALIKE_MM, ALIKE_RAD = 0.05, float(np.radians(0.1))
 _GAP_MM = 1e3
 # Places nearer to a pose than this (mm) are that pose.
 _SAME_MM = 1e-6
@@ -163,8 +165,9 @@ def placed(b: Blocks, sparse: Blocks, tolerance_mm: float = 0.1) -> Knots:
     """Return where the poses of a sparse path lie on the dense motion.
 
     Both have the same leads and data, whose ends are poses of both; between these each sparse pose is sought on the polyline
-    of the dense ones. Raises ValueError if they do not match, or a pose is farther from it than `tolerance_mm` and the bulge
-    of the motion between poses.
+    of the dense ones, by place and turn: where the TCP backs in a kink, it comes by the same place again, turned otherwise.
+    Raises ValueError if they do not match, or a pose is farther from it than `tolerance_mm` and the bulge of the motion
+    between poses.
     """
     end, theirs = np.flatnonzero(b.ends), np.flatnonzero(sparse.ends)
     if len(end) != len(theirs) or np.abs(b.xyz[end] - sparse.xyz[theirs]).max(initial=0.0) > tolerance_mm:
@@ -174,11 +177,13 @@ def placed(b: Blocks, sparse: Blocks, tolerance_mm: float = 0.1) -> Knots:
     for (u, v), (p, q) in zip(_pairs(end), _pairs(theirs), strict=True):
         if q - p < 2:
             continue
-        at, a, d = sparse.xyz[p + 1 : q], b.xyz[u:v], np.diff(b.xyz[u : v + 1], axis=0)
+        at, a = _weighed(sparse.y[p + 1 : q]), _weighed(b.y[u : v + 1])
+        at[:, 3:] *= np.where(sparse.wxyz[p] @ b.wxyz[u] < 0.0, -1.0, 1.0)
+        a, d = a[:-1], np.diff(a, axis=0)
         dd = np.maximum(np.einsum("ij,ij->i", d, d), _SAME_MM**2)
         t = (np.einsum("nj,mj->nm", at, d) - np.einsum("mj,mj->m", a, d)) / dd
         t = t.clip(0.0, 1.0)
-        gap2 = sum(((at[:, None, c] - a[None, :, c] - t * d[None, :, c]) ** 2 for c in range(3)), np.zeros_like(t))
+        gap2 = sum(((at[:, None, c] - a[None, :, c] - t * d[None, :, c]) ** 2 for c in range(7)), np.zeros_like(t))
         # A pass that comes by the same place again: the one that is as far along as the pose is.
         length = np.cumsum(np.linalg.norm(np.diff(sparse.xyz[p : q + 1], axis=0), axis=1))
         far = (length[:-1] / length[-1] * (b.s[v] - b.s[u]))[:, None] - (b.s[u:v] - b.s[u])
@@ -190,11 +195,17 @@ def placed(b: Blocks, sparse: Blocks, tolerance_mm: float = 0.1) -> Knots:
             * h**2
             * np.maximum(*(np.linalg.norm(b.bend[r, :3], axis=1) for r in (slice(u, v), slice(u + 1, v + 1))))
         )
-        if (np.sqrt(gap2[rows, best]) > tolerance_mm + bulge[best]).any():
+        away = np.linalg.norm((at - a[best] - t[rows, best, None] * d[best])[:, :3], axis=1)
+        if (away > tolerance_mm + bulge[best]).any():
             raise ValueError("the sparse path holds poses that the dense path does not pass")
         s[p + 1 : q] = b.s[u + best] + t[rows, best] * h[best]
     s = np.maximum.accumulate(s)
     return Knots(s, np.searchsorted(b.s, s + _SAME_MM, side="right") - 1, np.zeros(len(s)), sparse.y, sparse.block)
+
+
+def _weighed(y: Array) -> Array:
+    """Return poses (n, 7) with quaternions long enough that a turn counts as much as the distance that is tolerated with it."""
+    return y * np.array([1.0, 1.0, 1.0, *4 * [2.0 * ALIKE_MM / ALIKE_RAD]])
 
 
 def _pairs(ends: Ints) -> list[tuple[int, int]]:

@@ -11,6 +11,7 @@ from scipy.spatial.transform import Rotation, Slerp
 
 from benchmarks.planning.panels import Panel, panels, tube
 from planner.errors import EchoBaseError
+from planner.frames import Transform
 from planner.path.decimate import decimate, deviation
 from planner.path.passes import DataRuns, assemble
 from planner.path.raster import raster
@@ -239,12 +240,29 @@ def test_kinked_passes_keep_spacing_and_tolerance(step_mm: float) -> None:
         d = np.linalg.norm(np.diff(xyz, axis=0), axis=1)
         assert d.max() <= 15.0 + 1e-6
         assert np.maximum(d[1:] / d[:-1], d[:-1] / d[1:]).max() <= 2.0 + 1e-6
+        chord_mm, chord_deg, spline_mm, spline_deg = deviation(dense, sparse)
+        assert max(chord_mm, spline_mm) <= 0.05
+        assert max(chord_deg, spline_deg) <= 0.1
         if step_mm > 1.0:
             # Where the TCP backs at an inner kink, its nearest place on the motion is not its place in time.
             chord, spline = worst(dense, sparse, "natural")
             assert (chord <= (0.05, 0.1)).all()
             assert (spline <= (0.05, 0.1)).all()
     assert sent < poses
+
+
+@pytest.mark.parametrize("seed", [188, 296, 10044])
+def test_deviation_where_the_tcp_backs_in_a_kink(seed: int) -> None:
+    """There the motion comes by one place twice, turned otherwise: neither is taken for the other, nor an error for it."""
+    dense = kinked(seed, 0.7)
+    sparse = decimate(dense)
+    figures = np.array(deviation(dense, sparse))
+    assert (figures <= (0.05, 0.1, 0.05, 0.1)).all()
+    middle = len(sparse) // 2
+    turned = sparse.Ts_part_contact.rigid.as_matrix()
+    turned[middle, :3, :3] = turned[middle, :3, :3] @ Rotation.from_euler("x", 0.3, degrees=True).as_matrix()
+    wrong = replace(sparse, Ts_part_contact=Transform.from_matrix("part", "contact", turned))
+    assert deviation(dense, wrong)[1] > 0.1
 
 
 def test_nonsense_tolerances_are_refused() -> None:
