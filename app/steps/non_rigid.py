@@ -12,8 +12,9 @@ from alignment.estimate.align import residual_of
 from alignment.estimate.verdict import limit_issues, nominal_shift, residual_issues, verdict_of
 from alignment.metrics import Expected, expected
 from alignment.metrics.figures import WITHIN_DB
-from alignment.non_rigid import Field, FieldFit, SprungSurface, fit_field
+from alignment.non_rigid import Field, FieldFit, LeftOver, SprungSurface, fit_field, left_over
 from app.plan import Plan
+from app.steps.left import REST, STEP, left_issues, left_json, with_left, with_shape
 from planner.checks import check
 from planner.frames import Array, Transform
 from planner.issues import Issue
@@ -24,6 +25,8 @@ from planner.surface.curved import CurvedSurface
 from planner.toolpath import ToolPath
 
 PARTIAL = ("not-rigid", "harmful", "lock-contradicted", "off-edges", "non-rigid-support")
+# A rigid alignment promises to follow no shape: only a step of so many `tolerances.position_mm` has to be accepted.
+MUCH = 3.0
 # What a rigid verdict says of the misfit; said again of what is left after the field.
 ABOUT_MISFIT = ("not-rigid", "residual-large", "limit-displacement", "limit-rotation", "scan-of-another-part")
 # Share of the inspection's data poses that must stand where the data determine the field.
@@ -58,17 +61,39 @@ def follow(plan: Plan, cloud: PointCloud, found: Correction, adapt_poses: bool) 
         return Followed(found, plan.inspection, plan.inspection, False, None, None, None, found.deviation_mm, None)
     T = part_from_correction(found.T_base_basecorr, plan.setup.T_base_partnom)
     fit = fit_field(cloud, plan.curved, plan.setup, T, found.directions if adapt_poses else ())
+    left = left_over(cloud, plan.curved, plan.setup, fit.T_base_part, fit.field)
     if fit.field is None:
         if adapt_poses:
-            found = _refused(found, fit)
+            found = _refused(plan, found, fit, left)
         elif fit.seen:
             found = replace(found, issues=(*found.issues, unfollowed(fit)))
-        return _rigid(plan, found, plan.curved, T, None)
+        found = _left_said(found, left, plan, adapt_poses)
+        return _rigid(plan, found, plan.curved, T, None, left)
     if adapt_poses:
-        return _adapted(plan, found, fit, fit.field)
+        return _adapted(plan, found, fit, fit.field, left)
     found = _misfit_said(found, fit, plan)
-    found = replace(found, non_rigid=figures(fit, fit.field) | {"applied": False, "reason": "aligned as a rigid part"})
-    return _rigid(plan, found, SprungSurface(plan.curved, fit.field), T, fit.field)
+    found = replace(
+        found,
+        non_rigid=figures(fit, fit.field)
+        | left_json(left, plan.inspection)
+        | {"applied": False, "reason": "aligned as a rigid part"},
+    )
+    found = _left_said(found, left, plan, False)
+    return _rigid(plan, found, SprungSurface(plan.curved, fit.field), T, fit.field, left)
+
+
+def _left_said(found: Correction, left: LeftOver | None, plan: Plan, adapt_poses: bool) -> Correction:
+    """Return the rigid correction with what the scan shows beyond it."""
+    new = left_issues(left, plan.setup)
+    if {i.code for i in found.issues} & {"not-rigid", "residual-large", "sprung-back-unfollowed"}:
+        new = [i for i in new if i.code == STEP]
+    issues = [*found.issues, *new]
+    much = MUCH * plan.setup.tolerances.position_mm
+    steps = left is not None and bool(left.steps.found) and (adapt_poses or left.steps.found[0].height_mm > much)
+    slow = left is not None and adapt_poses and left.slow_rms_mm > plan.setup.tolerances.position_mm
+    partial = [*PARTIAL, *([STEP] if steps else []), *([REST] if slow else [])]
+    worse = found.verdict == "pass" and verdict_of(issues, partial) == "partial"
+    return replace(found, issues=tuple(issues), verdict="partial" if worse else found.verdict)
 
 
 def _misfit_said(found: Correction, fit: FieldFit, plan: Plan) -> Correction:
@@ -92,51 +117,68 @@ def _misfit_said(found: Correction, fit: FieldFit, plan: Plan) -> Correction:
     return replace(found, issues=tuple(issues), verdict=verdict_of(issues))  # type: ignore[arg-type]
 
 
-def _rigid(plan: Plan, found: Correction, surface: CurvedSurface, T: Transform, field: Field | None) -> Followed:
-    before, after = _seen(plan, surface, plan.inspection, T, field)
+def _rigid(
+    plan: Plan, found: Correction, surface: CurvedSurface, T: Transform, field: Field | None, left: LeftOver | None
+) -> Followed:
+    before, after = _seen(plan, surface, plan.inspection, T, field, left)
     # Of a part true to CAD the estimate's own error is all that is left, and `align` foresaw that; a field outweighs it.
     if field is None and found.after is not None:
-        after = replace(after, summary=found.after)
+        after = replace(after, summary=with_shape(found.after, after.summary, left))
     found = replace(found, before=before.summary, after=after.summary)
     npz = None if field is None else field_npz(field, plan.curved)
     sent = decimate(plan.inspection)
-    keyed = _keyed(plan, found, surface, T, field)
+    keyed = _keyed(plan, found, surface, T, field, left)
     return Followed(found, plan.inspection, sent, False, before, keyed, after, found.deviation_mm, npz)
 
 
 def _seen(
-    plan: Plan, surface: CurvedSurface, path: ToolPath, T_base_part: Transform, field: Field | None
+    plan: Plan,
+    surface: CurvedSurface,
+    path: ToolPath,
+    T_base_part: Transform,
+    field: Field | None,
+    left: LeftOver | None,
 ) -> tuple[Expected, Expected]:
     setup = plan.setup
     nominal = assume_nominal(setup.T_base_partnom)
     before = expected(surface, plan.inspection, setup, T_base_part)
     after = expected(surface, path, setup, nominal)
-    return _doubted(plan, before, field), _doubted(plan, after, field)
+    return _doubted(plan, before, field, left), _doubted(plan, after, field, left)
 
 
 def _keyed(
-    plan: Plan, found: Correction, surface: CurvedSurface, T_base_part: Transform, field: Field | None
+    plan: Plan,
+    found: Correction,
+    surface: CurvedSurface,
+    T_base_part: Transform,
+    field: Field | None,
+    left: LeftOver | None,
 ) -> Expected | None:
     """Return what the inspection sees if it runs in the BASE that the key-point method asks for."""
     if found.baseline is None:
         return None
-    left = Transform("base", "part", (found.baseline.inv() @ T_base_part).rigid)
-    return _doubted(plan, expected(surface, plan.inspection, plan.setup, left), field)
+    lies = Transform("base", "part", (found.baseline.inv() @ T_base_part).rigid)
+    return _doubted(plan, expected(surface, plan.inspection, plan.setup, lies), field, left)
 
 
-def _doubted(plan: Plan, seen: Expected, field: Field | None) -> Expected:
-    """Return what is seen, with the field's own standard deviations in its summary: of standoff, and of slope.
+def _doubted(plan: Plan, seen: Expected, field: Field | None, left: LeftOver | None) -> Expected:
+    """Return what is seen, with what the scan shows beyond it, and with the field's own standard deviations in its summary.
 
-    A slope known to s (of each of two directions) adds k s^2 per axis to the loss that is to be expected.
+    Spread and range are of the poses that stand where the scan went, if anything is left there that counts: what lies between
+    its passes is not known. A slope known to s (of each of two directions) adds k s^2 per axis to the loss to be expected.
     """
-    if field is None or field.support is None:
-        return seen
     poses = plan.inspection.take(plan.inspection.is_data)
-    at = field.support.nearest(poses.Ts_part_contact.xyz_mm)
     on = seen.on_part & np.isfinite(seen.distance_mm)
     if not on.any():
         return seen
-    d, s = seen.distance_mm[on], field.support.sigma_mm[at][on]
+    places = poses.Ts_part_contact.xyz_mm
+    known = on
+    if left is not None and left.counts:
+        seen, known = with_left(seen, left, places, on)
+    if field is None or field.support is None:
+        return seen
+    at = field.support.nearest(places)
+    d, s = seen.distance_mm[known], field.support.sigma_mm[at][known]
     slope_deg = np.degrees(field.support.slope_rad[at][on])
     loss = plan.setup.probe.tilt_loss_db_per_deg2
     db = seen.db[on] - (loss.b + loss.c) * slope_deg**2
@@ -164,33 +206,38 @@ def unfollowed(fit: FieldFit) -> Issue:
     )
 
 
-def _refused(found: Correction, fit: FieldFit) -> Correction:
+def _refused(plan: Plan, found: Correction, fit: FieldFit, left: LeftOver | None) -> Correction:
+    steps = left is not None and bool(left.steps.found)
+    reason = f"besides steps, {fit.reason}" if steps else fit.reason
     issue = Issue(
         "info",
         "non-rigid-refused",
-        f"no deformation is followed: {fit.reason}.",
+        f"no deformation is followed: {reason}.",
         "The rigid correction stands; scan more passes if the part is known to have sprung back.",
         "scan",
     )
     if fit.seen:
         issue = unfollowed(fit)
-    record = {"applied": False, "reason": fit.reason, "evidence": fit.gain}
+    record = {"applied": False, "reason": reason, "evidence": fit.gain, **left_json(left, plan.inspection)}
     return replace(found, non_rigid=record, issues=(*found.issues, issue))
 
 
-def _adapted(plan: Plan, found: Correction, fit: FieldFit, field: Field) -> Followed:
+def _adapted(plan: Plan, found: Correction, fit: FieldFit, field: Field, left: LeftOver | None) -> Followed:
     setup, T = plan.setup, fit.T_base_part
     surface = SprungSurface(plan.curved, field)
     dense = adapt(plan.inspection, plan.curved, field)
     sent = decimate(dense)
-    before, after = _seen(plan, surface, dense, T, field)
-    keyed = _keyed(plan, found, surface, T, field)
+    before, after = _seen(plan, surface, dense, T, field, left)
+    keyed = _keyed(plan, found, surface, T, field, left)
     residual = residual_of(fit.patches, replace(fit.rows, r=fit.rest_mm), fit.used)
     T_base_basecorr = correction(T, setup.T_base_partnom)
     issues = [_of_shape(i) for i in found.issues if i.code not in ABOUT_MISFIT]
     issues += limit_issues(*nominal_shift(setup, T, plan.surface.centroid_part), setup)
     issues += residual_issues(residual.rms_mm, setup)
     issues += _shape_issues(plan, fit, field)
+    issues += [
+        i for i in left_issues(left, setup) if i.code == STEP or residual.rms_mm <= 3.0 * setup.tolerances.position_mm
+    ]
     issues += [
         replace(i, where=f"corrected: {i.where}" if i.where else "corrected")
         for i in check(surface, sent, setup).issues
@@ -199,14 +246,14 @@ def _adapted(plan: Plan, found: Correction, fit: FieldFit, field: Field) -> Foll
     picked = np.flatnonzero(fit.used)
     found = replace(
         found,
-        verdict=verdict_of(issues, PARTIAL),  # type: ignore[arg-type]
+        verdict=verdict_of(issues, (*PARTIAL, STEP)),  # type: ignore[arg-type]
         T_base_basecorr=T_base_basecorr,
         centroid_mm=T.points(plan.surface.centroid_part),
         residual=residual,
         before=before.summary,
         after=after.summary,
         issues=tuple(issues),
-        non_rigid=figures(fit, field) | {"applied": True, "reason": None},
+        non_rigid=figures(fit, field) | left_json(left, plan.inspection) | {"applied": True, "reason": None},
         points_base=fit.rows.foot_base[picked],
         deviation_mm=-fit.rows.r[picked],
     )
