@@ -25,6 +25,8 @@ from planner.surface.curved import CurvedSurface
 from planner.toolpath import ToolPath
 
 PARTIAL = ("not-rigid", "harmful", "lock-contradicted", "off-edges", "non-rigid-support")
+# So many times beyond `tolerances.standoff_mm` and, at once, `tolerances.tilt_deg` no part springs back: another part does.
+ANOTHER_MM, ANOTHER_DEG = 2.5, 3.0
 # A rigid alignment promises to follow no shape: only a step of so many `tolerances.position_mm` has to be accepted.
 MUCH = 3.0
 # What a rigid verdict says of the misfit; said again of what is left after the field.
@@ -262,7 +264,12 @@ def _adapted(plan: Plan, found: Correction, fit: FieldFit, field: Field, left: L
 
 
 def _of_shape(issue: Issue) -> Issue:
-    """Return what a rigid fit said of the edges with the remedy that is left once the shape is followed."""
+    """Return what a rigid fit said of edges and of itself with the remedy that is left once the shape is followed."""
+    if issue.code == "no-convergence":
+        return replace(
+            issue,
+            remedy="Check that this is a scan of this part; if it is, scan more of the surface, and across its edges.",
+        )
     if issue.code != "off-edges":
         return issue
     remedy = "The shape is followed along the normal only: in the plane trust the correction no better than this."
@@ -270,8 +277,9 @@ def _of_shape(issue: Issue) -> Issue:
 
 
 def _shape_issues(plan: Plan, fit: FieldFit, field: Field) -> list[Issue]:
-    """Return what stands in the way of trusting the field: too little of the scan agrees, or poses stand beyond it."""
-    out = []
+    """Return what stands in the way of trusting the field: no part springs back like that, too little of the scan agrees, or
+    poses stand beyond it."""
+    out = _another_part(plan, fit, field)
     valid, kept = int(fit.rows.valid.sum()), int(fit.used.sum())
     if kept < ENOUGH_PATCHES * valid:
         out.append(
@@ -299,6 +307,30 @@ def _shape_issues(plan: Plan, fit: FieldFit, field: Field) -> list[Issue]:
         )
     )
     return out
+
+
+def _another_part(plan: Plan, fit: FieldFit, field: Field) -> list[Issue]:
+    """Return an error where the shape to be followed is another part's: a smooth field explains the difference of any two."""
+    assert fit.samples is not None
+    assert field.support is not None
+    inside, t = field.support.inside, plan.setup.tolerances
+    if not inside.any():
+        return []
+    f, g = field.on(fit.samples.face[inside], fit.samples.bary[inside])
+    off_mm, slope_deg = float(np.abs(f).max()), float(np.degrees(np.linalg.norm(g, axis=1).max()))
+    if off_mm <= ANOTHER_MM * t.standoff_mm or slope_deg <= ANOTHER_DEG * t.tilt_deg:
+        return []
+    return [
+        Issue(
+            "error",
+            "scan-of-another-part",
+            f"wherever it is put, the part scanned stands up to {off_mm:.1f} mm off the CAD, with slopes up to {slope_deg:.1f} "
+            "deg: that is another part's shape rather than spring-back.",
+            "Check that this is a scan of this part, in its unit and BASE; if the part does spring back that far, raise "
+            "tolerances.standoff_mm and tolerances.tilt_deg.",
+            "scan",
+        )
+    ]
 
 
 def figures(fit: FieldFit, field: Field) -> dict[str, Any]:

@@ -116,3 +116,15 @@ def test_gentle_shapes_are_no_steps(shape):
     assert told_of.followed.found.non_rigid["applied"]
     assert told_of.issue("step-unfollowed") is None
     assert told_of.issue("rest-unfollowed") is None
+
+
+@pytest.mark.slow
+def test_another_part_is_not_followed_as_shape():
+    """A shell of radii 1.5 m and 0.7 m scanned by the plan of a plate: a smooth field fits it to a quarter of a millimetre."""
+    told_of = told("plate", lambda p: -((p[:, 0] - 150.0) ** 2) / 3000.0 - (p[:, 1] - 100.0) ** 2 / 1400.0, 1)
+    found = told_of.followed.found
+    assert found.residual.rms_mm < 0.5
+    assert found.verdict == "fail"
+    issue = told_of.issue("scan-of-another-part")
+    assert issue.severity == "error"
+    assert "Check that this is a scan of this part" in issue.remedy
