@@ -10,6 +10,7 @@ from alignment.estimate.cells import cells_along_passes
 from alignment.estimate.patches import condense
 from alignment.estimate.pose_line import pose_line
 from alignment.estimate.problem import Problem
+from alignment.estimate.readings import look_at
 from alignment.estimate.robust import mad_sigma
 from alignment.estimate.surface_rows import patch_rows
 from alignment.non_rigid.field import Field
@@ -68,8 +69,9 @@ def rest_of(cloud: PointCloud, curved: CurvedSurface, setup: Setup, T_base_part:
         return None
     problem = Problem(curved, setup)
     line = pose_line(cloud, setup.probe)
-    cells = cells_along_passes(cloud, line, setup.probe, max(FINE_MM, line.spacing_mm), MOST_FINE)
-    patches = condense(cloud, cells, curved, T_base_part, setup.alignment.point_model)
+    readings = look_at(cloud, setup.alignment.point_model)
+    cells = cells_along_passes(readings, line, setup.probe, max(FINE_MM, line.spacing_mm), MOST_FINE)
+    patches = condense(readings, cells, curved, T_base_part)
     rows = patch_rows(patches, curved, T_base_part, problem.centre_mm(T_base_part))
     points = T_base_part.inv().points(rows.foot_base)
     total = np.bincount(cells.of_reading, minlength=len(cells))
