@@ -258,11 +258,12 @@ def test_deviation_where_the_tcp_backs_in_a_kink(seed: int) -> None:
     sparse = decimate(dense)
     figures = np.array(deviation(dense, sparse))
     assert (figures <= (0.05, 0.1, 0.05, 0.1)).all()
-    middle = len(sparse) // 2
+    # One that stands on a dense pose: beside kinks there are more of them than poses to see their error.
+    one = 5
     turned = sparse.Ts_part_contact.rigid.as_matrix()
-    turned[middle, :3, :3] = turned[middle, :3, :3] @ Rotation.from_euler("x", 0.3, degrees=True).as_matrix()
+    turned[one, :3, :3] = turned[one, :3, :3] @ Rotation.from_euler("x", 0.3, degrees=True).as_matrix()
     wrong = replace(sparse, Ts_part_contact=Transform.from_matrix("part", "contact", turned))
-    assert deviation(dense, wrong)[1] > 0.1
+    assert deviation(dense, wrong)[1] > 0.2
 
 
 def test_nonsense_tolerances_are_refused() -> None:
