@@ -11,13 +11,15 @@ from app.api.downloads import streamed
 from app.api.errors import documented
 from app.api.models import Scan
 from app.api.receive import Received, receive
+from app.api.scan_glance import glance
 from app.api.upload_body import choice, files, upload_body
 from app.store import inputs, projects, scans
 from app.store.blobs import Blob
-from app.store.refusal import not_found, refuse
+from app.store.refusal import Refusal, not_found, refuse
 from app.store.results import correction_in_force
 from app.store.store import Store
 from app.store.tables import ScanRow
+from planner.errors import EchoBaseError
 
 router = APIRouter(prefix="/projects/{project_id}/scans", tags=["scans"])
 BaseName = Literal["nominal", "corrected"]
@@ -44,14 +46,22 @@ async def upload_scan(
 ) -> Scan:
     """Upload a scan: a form with one or two `file`s and `base`, or a bare file with `?name=scan.csv`.
 
-    It is kept as it came and read when it is used; what a reader finds wrong is then said with the line it is in.
+    It is kept as it came and read when it is used; what a reader finds wrong is then said with the line it is in. A file whose
+    beginning says that it is no scan is refused at once.
     """
-    with ctx.store.busy():
-        await asyncio.to_thread(_exists, ctx.store, project_id)
-        received = await receive(request, ctx.store, ctx.settings.max_scan_bytes, 2, "scan", name)
-        said_base = _choice(received.fields.get("base"), ("nominal", "corrected"), "base") or base
-        said_path = _choice(received.fields.get("path"), ("alignment", "inspection", "corrected"), "path") or path
-        row = await asyncio.to_thread(_add, ctx.store, project_id, received, said_base, said_path)
+    try:
+        with ctx.store.busy():
+            await asyncio.to_thread(_exists, ctx.store, project_id)
+            received = await receive(request, ctx.store, ctx.settings.max_scan_bytes, 2, "scan", name)
+            said_base = _choice(received.fields.get("base"), ("nominal", "corrected"), "base") or base
+            said_path = _choice(received.fields.get("path"), ("alignment", "inspection", "corrected"), "path") or path
+            for shown, blob in received.files:
+                await asyncio.to_thread(glance, ctx.store.blobs, shown, blob)
+            row = await asyncio.to_thread(_add, ctx.store, project_id, received, said_base, said_path)
+    except (EchoBaseError, Refusal):
+        # What was refused is named by no row: it goes.
+        await asyncio.to_thread(ctx.store.tidy)
+        raise
     ctx.store.tell(project_id, "scan", number=row.number)
     response.headers["Location"] = f"/api/v1/projects/{project_id}/scans/{row.number}"
     return await asyncio.to_thread(_answer, ctx.store, row)

@@ -15,7 +15,7 @@ from tests.api.conftest import aligned, error_of, new_project, planned
 def archived(client):
     address = new_project(client, name="Träger / 7 ../..")
     planned(client, address)
-    aligned(client, address, b"want-partial")
+    aligned(client, address, b"x_mm\n1\n# want-partial")
     client.post(f"{address}/alignments/1/accept", json={"name": "A", "reason": "b"})
     answer = client.get(f"{address}/archive")
     assert answer.status_code == 200

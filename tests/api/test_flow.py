@@ -86,7 +86,7 @@ def test_putting_the_same_input_back_makes_results_fresh_again(client):
 def test_a_partial_alignment_needs_a_name_and_a_reason(client):
     address = new_project(client)
     planned(client, address)
-    assert aligned(client, address, b"want-partial")["result"]["verdict"] == "partial"
+    assert aligned(client, address, b"x_mm\n1\n# want-partial")["result"]["verdict"] == "partial"
     assert error_of(client.get(f"{address}/programs/corrected"), 409)["code"] == "acceptance-missing"
     error_of(client.post(f"{address}/alignments/1/accept", json={"name": "  ", "reason": "x"}), 422)
     error_of(client.post(f"{address}/alignments/1/accept", json={"name": "A"}), 422)
@@ -94,7 +94,7 @@ def test_a_partial_alignment_needs_a_name_and_a_reason(client):
     assert accepted.json()["accepted"]["reason"] == "gauge agrees"
     assert client.get(f"{address}/programs/corrected").status_code == 200
     # A new alignment is a new decision.
-    aligned(client, address, b"want-partial again")
+    aligned(client, address, b"x_mm\n1\n# want-partial again")
     error_of(client.get(f"{address}/programs/corrected"), 409)
 
 
@@ -103,7 +103,7 @@ def test_a_failed_alignment_is_never_handed_out(client):
     planned(client, address)
     aligned(client, address)
     assert client.get(f"{address}/programs/corrected").status_code == 200
-    aligned(client, address, b"want-fail")
+    aligned(client, address, b"x_mm\n1\n# want-fail")
     assert error_of(client.get(f"{address}/programs/corrected"), 409)["code"] == "alignment-failed"
     error_of(client.post(f"{address}/alignments/2/accept", json={"name": "A", "reason": "b"}), 409)
     assert client.get(f"{address}/alignments/1").json()["program"]["available"] is False

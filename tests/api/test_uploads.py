@@ -11,6 +11,7 @@ import pytest
 from tests.api.conftest import error_of, new_project
 from tests.api.server_process import ServerProcess, running
 
+HDF5 = b"\x89HDF\r\n\x1a\n"
 MIB = 2**20
 
 
@@ -26,7 +27,8 @@ def resident_mb(pid: int) -> tuple[float, float]:
 def pattern(size: int) -> list[bytes]:
     """Return `size` bytes of noise in pieces."""
     piece = random.Random(4).randbytes(MIB)
-    return [piece] * (size // MIB)
+    # It begins like a format whose content is anything.
+    return [HDF5 + piece[len(HDF5) :], *[piece] * (size // MIB - 1)]
 
 
 @pytest.mark.parametrize("how", ["raw", "form"])
@@ -38,10 +40,10 @@ def test_200_mb_do_not_stay_in_memory(client, server, how):
         whole.update(piece)
     before, _ = resident_mb(server.pid)
     Path(f"/proc/{server.pid}/clear_refs").write_text("5")  # forget the peak so far
-    head = b'--b\r\nContent-Disposition: form-data; name="file"; filename="big.csv"\r\n\r\n'
+    head = b'--b\r\nContent-Disposition: form-data; name="file"; filename="big.h5"\r\n\r\n'
     body = [head, *pieces, b"\r\n--b--\r\n"] if how == "form" else pieces
     headers = {"Content-Type": "multipart/form-data; boundary=b"} if how == "form" else {}
-    made = client.post(f"{address}/scans", params={"name": "big.csv"}, content=iter(body), headers=headers)
+    made = client.post(f"{address}/scans", params={"name": "big.h5"}, content=iter(body), headers=headers)
     assert made.status_code == 201, made.text
     assert made.json()["files"][0]["sha256"] == whole.hexdigest()
     _, peak = resident_mb(server.pid)
@@ -127,9 +129,9 @@ def _upload(url, address, seed, stop, answered, acknowledged, versions) -> None:
     dice = random.Random(seed + len(acknowledged))
     with httpx.Client(base_url=url, timeout=10.0) as client:
         while not stop.is_set():
-            data = dice.randbytes(dice.randrange(1, 300_000))
+            data = HDF5 + dice.randbytes(dice.randrange(1, 300_000))
             try:
-                made = client.post(f"{address}/scans", params={"name": "s.csv"}, content=data)
+                made = client.post(f"{address}/scans", params={"name": "s.h5"}, content=data)
                 if made.status_code == 201:
                     acknowledged.append((address, made.json()["number"], hashlib.sha256(data).hexdigest()))
                     answered.release()

@@ -190,14 +190,14 @@ def test_a_mesh_without_a_unit_is_told_by_its_size(server, page, tmp_path):
 
 
 def test_why_a_job_failed_is_said(server, page, pid):
-    request = urllib.request.Request(f"{server.url}/api/v1/projects/{pid}/scans?name=wrong.csv", b"a;b\n1;2\n")
+    request = urllib.request.Request(f"{server.url}/api/v1/projects/{pid}/scans?name=wrong.csv", b"x_mm,law\n1,2\n")
     urllib.request.urlopen(request).close()
     opened(page, server, pid, "alignment")
     page.get_by_role("button", name="Align", exact=True).click()
-    page.locator(".inspector .issue.error", has_text="semicolons").wait_for(timeout=journey.SLOW)
+    page.locator(".inspector .issue.error", has_text="missing").wait_for(timeout=journey.SLOW)
     # It is still there for somebody who comes later.
     page.reload()
-    page.locator(".inspector .issue.error", has_text="semicolons").wait_for(timeout=journey.SLOW)
+    page.locator(".inspector .issue.error", has_text="missing").wait_for(timeout=journey.SLOW)
 
 
 def test_two_browsers_see_each_others_key_points(server, page, chromium, pid):
