@@ -19,8 +19,12 @@ LAWS, SPACING_MM = 9, 2.0
 MOST_DB = 20.0
 
 
-def tilt_loss_db(cloud: PointCloud, line: PoseLine, problem: Problem, T_base_part: Transform) -> tuple[Array, Array]:
+def expected_at_edges(
+    cloud: PointCloud, line: PoseLine, problem: Problem, T_base_part: Transform
+) -> tuple[Array, Array, Array]:
     """Return the loss (m, laws), dB, positive, that the set-up lets one expect of the tilt of the placed surface, twice.
+
+    And the distance (m, laws), mm, of that surface, continued flat past its rim; NaN where there is no beam.
 
     k alpha^2 per axis (`probe.tilt_loss_db_per_deg2`). A beam over the rim has its echo from what is still under it: the
     tilt is taken as that at the rim; or, the other extreme, as that of the surface bent on as it ends.
@@ -30,8 +34,9 @@ def tilt_loss_db(cloud: PointCloud, line: PoseLine, problem: Problem, T_base_par
     at = np.unique(np.linspace(0, len(x) - 1, LAWS).round().astype(np.intp))
     rows = np.flatnonzero(line.present & (np.linalg.norm(line.beam_base, axis=1) > 0))
     loss = np.zeros((len(line.present), len(x)))
+    expected = np.full(loss.shape, np.nan)
     if not len(rows):
-        return loss, loss.copy()
+        return loss, loss.copy(), expected
     step = max(1, round(SPACING_MM / max(line.spacing_mm, 1e-3)))
     some = np.unique(np.r_[rows[::step], rows[-1]])
     z, a = line.beam_base[some], line.array_base[some]
@@ -39,7 +44,8 @@ def tilt_loss_db(cloud: PointCloud, line: PoseLine, problem: Problem, T_base_par
     points_part = T_base_part.inv().points(origins.reshape(-1, 3))
     foot = problem.curved.closest(points_part)
     off = points_part - foot.points
-    beyond = off - np.einsum("ij,ij->i", off, foot.normals)[:, None] * foot.normals
+    height = np.einsum("ij,ij->i", off, foot.normals)
+    beyond = off - height[:, None] * foot.normals
     bent = foot.normals + np.einsum("nij,nj->ni", problem.curved.shape_operator(foot.face, foot.bary), beyond)
     bent /= np.linalg.norm(bent, axis=1, keepdims=True)
     # Linear between the laws looked up; a pose takes the tilt of the next one looked up.
@@ -52,4 +58,5 @@ def tilt_loss_db(cloud: PointCloud, line: PoseLine, problem: Problem, T_base_par
         b, c = (v.reshape(len(some), len(at)) @ weights for v in tilts)
         out.append(np.zeros_like(loss))
         out[-1][rows] = np.minimum(-loss_db(b, c, probe), MOST_DB)[place]
-    return out[0], out[1]
+    expected[rows] = (height.reshape(len(some), len(at)) @ weights)[place]
+    return out[0], out[1], expected

@@ -17,7 +17,7 @@ LEAST_AGREE, LEAST_CROSSINGS = 0.7, 20
 def edge_report(system: System, T_base_part: Transform, nuisance: Array, covariance: Array) -> dict[str, Any] | None:
     """Return crossings and those used, how far these lie off, and bias and lag with their sigmas; None without any.
 
-    rms_mm: of single crossings; off_mm: of the medians of the ends of passes.
+    rms_mm: of single crossings, as they count; off_mm: of the medians of the ends of passes.
     nuisance (3,): bias, lag and tilt loss, in their sigmas. covariance (9, 9): of the motion and of them. `late_mm` is what
     bias and lag come to together: known even where every edge was crossed outwards and they cannot be told apart.
     """
@@ -32,7 +32,7 @@ def edge_report(system: System, T_base_part: Transform, nuisance: Array, covaria
     return {
         "crossings": len(edges.used),
         "used": int(edges.used.sum()),
-        "rms_mm": float(np.sqrt(np.mean(left**2))) if len(left) else 0.0,
+        "rms_mm": float(np.sqrt(np.average(left**2, weights=points.weight))) if len(left) else 0.0,
         "off_mm": _off_mm(left, points.pass_id, points.along, found.lag[edges.used] > 0),
         "bias_mm": float(bias),
         "bias_sigma_mm": float(np.sqrt(both[0, 0])),

@@ -12,7 +12,7 @@ from alignment.estimate.capture import Captured, capture
 from alignment.estimate.cells import Cells, cells_along_passes, cells_in_space
 from alignment.estimate.directions import Direction, directions, held_basis
 from alignment.estimate.edge_curve import locate
-from alignment.estimate.edge_gain import tilt_loss_db
+from alignment.estimate.edge_gain import expected_at_edges
 from alignment.estimate.edge_points import edge_points
 from alignment.estimate.edge_report import edge_report, off_edges
 from alignment.estimate.edge_rows import EdgeMap
@@ -190,7 +190,7 @@ def edge_data(cloud: PointCloud, problem: Problem, line: PoseLine | None, T_base
     edges = EdgeMap(boundary(problem.curved.surface), probe.beam_width_mm)
     if len(edges) == 0:
         return None
-    points = edge_points(cloud, line, probe, *tilt_loss_db(cloud, line, problem, T_base_part))
+    points = edge_points(cloud, line, probe, *expected_at_edges(cloud, line, problem, T_base_part))
     if len(points) == 0:
         return None
     points = locate(points, np.ones(len(points)), probe.beam_width_mm)

@@ -119,9 +119,12 @@ def _add_edges(
     if valid.sum() < LEAST_CROSSINGS:
         return replace(edges, used=valid & False)
     sigma = float(np.clip(mad_sigma(r[valid], EDGE_FLOOR_MM, about_zero=True), *limits_mm))
-    used = valid & (np.abs(r) < EDGE_REJECT * sigma)
+    weight = edges.points.weight
+    # What is poorly known may lie farther off.
+    off = np.abs(r) * np.sqrt(np.minimum(weight, 1.0))
+    used = valid & (off < EDGE_REJECT * sigma)
     x = np.hstack([found.jacobian * problem.prior_sigma, columns])[used]
-    w = tukey_weights(r[used], sigma) / (SHARED_MM + sigma) ** 2
+    w = weight[used] * tukey_weights(off[used], sigma) / (SHARED_MM + sigma) ** 2
     normal += (x * w[:, None]).T @ x
     pull -= (x * w[:, None]).T @ r[used]
     return replace(edges, used=used)

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from scipy.special import erf
 
-from alignment.estimate.edge_curve import fit_beam, place
+from alignment.estimate.edge_curve import Beam, Shares, fit_beam, place
 from alignment.estimate.edge_rows import EdgeMap
 from planner.surface.boundary import boundary
 from tests.alignment.clouds import curved_of
@@ -30,15 +30,19 @@ def windows(share, gap_mm, at, rng, noise):
     return np.where(value < LEAST_HEARD, 0.0, value)
 
 
+def around(window, gap_mm, scatter=0.02, dropout=1e-3):
+    return Shares(window, np.full(len(window), gap_mm), scatter, dropout)
+
+
 @pytest.mark.parametrize(("share", "blend"), [(disc, 1.0), (gauss, 0.0)])
 @pytest.mark.parametrize("gap_mm", [0.6, 1.0, 2.0])
 def test_the_place_does_not_depend_on_where_the_readings_stand(share, blend, gap_mm):
     at = np.linspace(0.02, 0.98, 97)
-    window = windows(share, gap_mm, at, np.random.default_rng(0), 0.0)
-    found, width = fit_beam(window, np.full(len(at), gap_mm), 1.2 * WIDTH_MM)
-    assert abs(width / WIDTH_MM - 1.0) < 0.02
-    assert abs(found - blend) < 0.15
-    error_mm = gap_mm * (place(window, np.full(len(at), gap_mm), found, width)[0] - at)
+    shares = around(windows(share, gap_mm, at, np.random.default_rng(0), 0.0), gap_mm)
+    beam = fit_beam(shares, 1.2 * WIDTH_MM)
+    assert abs(beam.width_mm / WIDTH_MM - 1.0) < 0.02
+    assert abs(beam.blend - blend) < 0.15
+    error_mm = gap_mm * (place(shares, beam).at - at)
     assert np.abs(error_mm).max() < 0.02
 
 
@@ -47,9 +51,33 @@ def test_noise_of_the_amplitude_averages_out_and_a_splash_is_left_aside():
     at = rng.uniform(0.05, 0.95, 2000)
     window = windows(disc, 2.0, at, rng, 0.02)
     window[::4, 1] = 0.6
-    error_mm = 2.0 * (place(window, np.full(len(at), 2.0), 1.0, WIDTH_MM)[0] - at)
+    error_mm = 2.0 * (place(around(window, 2.0), Beam(1.0, WIDTH_MM)).at - at)
     assert abs(error_mm.mean()) < 0.004
     assert error_mm.std() < 0.05
+
+
+@pytest.mark.parametrize(("share", "blend"), [(disc, 1.0), (gauss, 0.0)])
+@pytest.mark.parametrize("gap_mm", [0.6, 1.0])
+def test_lost_echoes_and_splash_cost_no_more_than_the_readings_lost(share, blend, gap_mm):
+    """One share in ten is none of the edge's, one echo in five is lost: where the edge is remains known as well as said."""
+    rng = np.random.default_rng(2)
+    at = rng.uniform(0.0, 1.0, 3000)
+    window = windows(share, gap_mm, at, rng, 0.02)
+    # A splash is mostly told by its distance (NaN), but not always.
+    fate = rng.random(window.shape)
+    window = np.where(fate < 0.01, rng.random(window.shape), np.where(fate < 0.1, np.nan, window))
+    window = np.where(fate > 0.8, 0.0, window)
+    shares = around(window, gap_mm, dropout=0.2)
+    beam = fit_beam(shares, 0.9 * WIDTH_MM)
+    assert abs(beam.width_mm / WIDTH_MM - 1.0) < 0.03
+    found = place(shares, beam)
+    error_mm, sigma_mm = gap_mm * (found.at - at), gap_mm / np.sqrt(np.maximum(found.information, 1e-12))
+    told = sigma_mm < 0.1
+    assert told.mean() > 0.7
+    assert 1.4826 * np.median(np.abs(error_mm[told] / sigma_mm[told])) < 1.4
+    weight = 1.0 / (sigma_mm[told] ** 2 + 0.02**2)
+    assert abs(np.average(np.clip(error_mm[told], -0.15, 0.15), weights=weight)) < 0.005
+    assert np.mean(np.abs(error_mm[told]) > 0.3) < 0.03
 
 
 def test_crossings_near_a_corner_say_nothing():
