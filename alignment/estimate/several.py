@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 from alignment.cloud import PointCloud
 from alignment.correction import AxisResult, Correction
 from alignment.estimate.align import baseline_of, empty, finish, residual_of, shape_of, with_residual
-from alignment.estimate.capture import Captured
+from alignment.estimate.capture import Captured, capture_together
 from alignment.estimate.diagnose import diagnose_fit, diagnose_lost
 from alignment.estimate.directions import Direction, named_statuses
 from alignment.estimate.keypoint_method import align_keypoints, match_keypoints
@@ -25,7 +25,6 @@ from alignment.estimate.motion import motion_rows, named_axes, rms_displacement_
 from alignment.estimate.patches import Patches
 from alignment.estimate.pose_line import pose_line
 from alignment.estimate.problem import Problem
-from alignment.estimate.several_capture import capture_several
 from alignment.estimate.several_checks import bases_in_first, require_one_part
 from alignment.estimate.several_rows import Member, SeveralEdges, SeveralTracks, joined_edges, joined_patches
 from alignment.estimate.several_surface import union_of
@@ -75,7 +74,8 @@ def align_several(scans: Sequence[SurfaceScan], edges: bool | None = None) -> tu
             "Align them one after the other.",
         )
     problem = Problem(union_of([s.curved.surface for s in scans]), scans[0].setup)
-    captured = capture_several(members, [s.cloud for s in scans], [s.setup for s in scans], problem)
+    samplers = [m.sampler(s.cloud, s.setup.alignment.point_model) for m, s in zip(members, scans, strict=True)]
+    captured = capture_together(samplers, problem)
     if not all(c.converged for c in captured):
         return _lost(scans, captured)
     found, tracks, crossings = _fitted(scans, members, captured, problem, edges is not False)

@@ -9,13 +9,15 @@ from dataclasses import dataclass, fields, replace
 
 import numpy as np
 
+from alignment.cloud import PointCloud
 from alignment.estimate.cells import Cells
 from alignment.estimate.edge_points import EdgePoints
 from alignment.estimate.edge_rows import EdgeRows, edge_rows
 from alignment.estimate.motion import motion_rows
 from alignment.estimate.patches import Patches
 from alignment.estimate.problem import Problem
-from alignment.estimate.surface_rows import Rows, patch_rows
+from alignment.estimate.sample import Sample, Sampler, sampler
+from alignment.estimate.surface_rows import Rows, joined_rows, patch_rows
 from alignment.estimate.system import EdgeData
 from planner.frames import Array, Transform
 from planner.surface.curved import CurvedSurface
@@ -42,6 +44,18 @@ class Member:
         point, normal = self.T_first_own.points(rows.foot_base), self.T_first_own.directions(rows.normal_base)
         return Rows(rows.r, motion_rows(point, normal, centre_mm), rows.valid, point, normal)
 
+    def sampler(self, cloud: PointCloud, point_model: str) -> Sampler:
+        """Return the sample of a cloud on the plan's surface, as seen in the first plan's base."""
+        own = sampler(cloud, self.curved, point_model)
+        return Sampler(self._seen(own.every), lambda: self._seen(own.few()))
+
+    def _seen(self, sample: Sample) -> Sample:
+        def rows(T_base_part: Transform, centre_mm: Array) -> Rows:
+            own_centre = self.T_first_own.inv().points(centre_mm)
+            return self.in_first(sample.rows(self.placed(T_base_part), own_centre), centre_mm)
+
+        return Sample(sample.heard, rows)
+
 
 class SeveralTracks:
     """The residuals of the patches of several scans (as `Track` for one): each against the surface of its plan."""
@@ -61,11 +75,6 @@ class SeveralTracks:
         """Return the rows of all scans, one after the other, in the first plan's base."""
         found = self.each(T_base_part, centre_mm)
         return joined_rows([m.in_first(r, centre_mm) for m, r in zip(self.members, found, strict=True)])
-
-
-def joined_rows(parts: Sequence[Rows]) -> Rows:
-    """Return rows one after the other."""
-    return Rows(*(np.concatenate([getattr(p, f.name) for p in parts]) for f in fields(Rows)))
 
 
 def joined_patches(members: Sequence[Member], parts: Sequence[Patches], curved: CurvedSurface) -> Patches:

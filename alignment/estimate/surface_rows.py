@@ -1,6 +1,7 @@
 """Residuals of patches against the placed surface, and how they change as the part moves."""
 
-from dataclasses import dataclass, replace
+from collections.abc import Sequence
+from dataclasses import dataclass, fields, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -97,6 +98,11 @@ def _rows_at(
         length = np.linalg.norm(beams_base, axis=1)
         valid &= (np.einsum("ij,ij->i", beams_base, normal) < -FACING_COS * length) | (length == 0)
     return Rows(distance_mm - foot.distance_mm, motion_rows(point, normal, centre_mm), valid, point, normal)
+
+
+def joined_rows(parts: Sequence[Rows]) -> Rows:
+    """Return rows one after the other."""
+    return Rows(*(np.concatenate([getattr(p, f.name) for p in parts]) for f in fields(Rows)))
 
 
 def same_afresh(patches: Patches, curved: CurvedSurface, T_base_part: Transform, rows: Rows) -> bool:
