@@ -88,7 +88,10 @@ function inputFor(schema, value, id, name, bounds, change, empty) {
       },
     });
   }
-  return h("input", { ...common, type: "text", value: value ?? "", pattern: patternOf(schema.pattern), maxlength: schema.maxLength, onchange: (e) => e.target.reportValidity() && change(e.target.value) });
+  return h("input", {
+    ...common, type: "text", value: value ?? "", pattern: patternOf(schema.pattern), maxlength: schema.maxLength, placeholder: schema.nullable ? empty : "",
+    onchange: (e) => e.target.reportValidity() && change(schema.nullable && e.target.value === "" ? null : e.target.value),
+  });
 }
 
 // A text that may be longer than this gets an area of its own.

@@ -1,6 +1,6 @@
 // The nine steps of the job: their state, and the one number that matters, from what the project holds.
 
-import { deg, fixed, mm, pct, sizes, whole } from "./format.js";
+import { deg, fixed, mm, pct, whole } from "./format.js";
 import { toneOf } from "./status.js";
 
 export const STEPS = [["part", "Part"], ["cell", "Cell"], ["surface", "Surface"], ["keypoints", "Key points"], ["paths", "Paths"], ["programs", "Programs"], ["scan", "Scan"], ["alignment", "Alignment"], ["report", "Report"]];
@@ -18,7 +18,7 @@ export function journey(data) {
   const free = Object.values(programs).filter((p) => p.available).length;
   const stale = (result, state) => (result.stale ? { ...state, tone: "warn", word: "out of date" } : state);
   const states = {
-    part: part ? done(sizes(part.extents_mm)) : { ...TODO, word: "start here", fact: "Load the CAD of the part" },
+    part: part ? done(`${part.extents_mm.map((v) => fixed(v, v < 10 ? 1 : 0)).join(" × ")} mm`) : { ...TODO, word: "start here", fact: "Load the CAD of the part" },
     cell: !setup ? TODO : done(`${setup.robot}, ${setup.probe.elements === 1 ? "single crystal" : `${setup.probe.elements} elements`}`, taught ? "BASE taught" : "BASE untaught"),
     surface: !part ? TODO : done(plan && !plan.stale ? `${whole(plan.surface.area_mm2 / 100)} cm²` : surface?.seeds?.length ? "chosen" : "the largest face", surface?.seeds?.length ? "chosen" : "by default"),
     keypoints: keyPoints(keypoints, fresh, bad, part),

@@ -17,7 +17,7 @@ from tests.browser.real_server import RealServer
 # A software renderer on busy cores takes its time.
 pytestmark = [pytest.mark.browser, pytest.mark.slow, pytest.mark.timeout(900)]
 SIX = ("x_mm", "y_mm", "z_mm", "a_deg", "b_deg", "c_deg")
-TITLES = {"part": "Part", "cell": "Cell", "keypoints": "Key points", "alignment": "Alignment"}
+TITLES = {"part": "Part", "cell": "Cell", "scan": "Scan", "keypoints": "Key points", "alignment": "Alignment"}
 OFFSET = {"x": "1.1", "y": "-0.7", "z": "1.0", "a": "0.2", "b": "-0.8", "c": "0.5"}
 
 
@@ -194,10 +194,31 @@ def test_why_a_job_failed_is_said(server, page, pid):
     urllib.request.urlopen(request).close()
     opened(page, server, pid, "alignment")
     page.get_by_role("button", name="Align", exact=True).click()
-    page.locator(".inspector .issue.error", has_text="missing").wait_for(timeout=journey.SLOW)
+    said = page.locator(".inspector .issue.error", has_text="missing").filter(has_text=re.compile(r"scan-\d+\.csv"))
+    said.wait_for(timeout=journey.SLOW)
     # It is still there for somebody who comes later.
     page.reload()
-    page.locator(".inspector .issue.error", has_text="missing").wait_for(timeout=journey.SLOW)
+    said.wait_for(timeout=journey.SLOW)
+
+
+def test_what_can_be_no_scan_is_said_at_once_and_readings_go_only_when_asked(server, page, pid):
+    opened(page, server, pid, "scan")
+    before = server.rest(f"/projects/{pid}/scans")
+    files = page.locator(".inspector .drop input[type=file]")
+    files.set_input_files({"name": "wrong.csv", "mimeType": "text/csv", "buffer": b"a;b\n1;2\n"})
+    page.locator(".inspector .issue.error", has_text="semicolons").wait_for(timeout=journey.SLOW)
+    assert server.rest(f"/projects/{pid}/scans") == before
+    files.set_input_files({"name": "half.csv", "mimeType": "text/csv", "buffer": b"x_mm,law\n1,2\n"})
+    until(page, lambda: len(server.rest(f"/projects/{pid}/scans")) == len(before) + 1, what="the scan")
+    number = server.rest(f"/projects/{pid}/scans")[-1]["number"]
+    delete = page.get_by_role("button", name=f"Delete scan {number}", exact=True)
+    delete.click(timeout=journey.SLOW)
+    page.locator("dialog").get_by_role("button", name="Cancel").click()
+    assert len(server.rest(f"/projects/{pid}/scans")) == len(before) + 1
+    delete.click()
+    page.locator("dialog button[type='submit']").click()
+    until(page, lambda: server.rest(f"/projects/{pid}/scans") == before, what="the scan to go")
+    delete.wait_for(state="detached")
 
 
 def test_two_browsers_see_each_others_key_points(server, page, chromium, pid):

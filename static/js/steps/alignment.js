@@ -37,7 +37,7 @@ export function content(shell) {
     before(a),
     surfaces(a),
     sprang(a.non_rigid),
-    facts([["Residual, rms", mm(a.residual?.rms_mm), "mm"], ["Residual, 95 %", mm(a.residual?.p95_mm), "mm"], ["Readings used", whole(a.residual?.readings)], ["Method", h("span", {}, a.method === "map" ? "MAP, all readings" : "key points (paper)")]]),
+    facts([["Residual, rms", mm(a.residual?.rms_mm), "mm"], ["Residual, 95 %", mm(a.residual?.p95_mm), "mm"], ["Readings used", whole(a.residual?.readings)], ["Method", h("span", {}, a.method === "map" ? "all readings (MAP)" : "key points (paper)")]]),
     a.verdict === "pass" && issueList(a.issues, 8),
     companions(shell, local),
     options(shell, local),
@@ -110,7 +110,7 @@ function before(a) {
 
 function options(shell, local) {
   const radio = (name, value, text) => h("label", { class: "row tight" }, h("input", { type: "radio", name, value, checked: local[name] === value, onchange: () => { local[name] = value; shell.draw(); } }), text);
-  return h("details", { class: "group", open: local.open, ontoggle: (e) => { local.open = e.target.open; } }, h("summary", {}, h("span", {}, "Options"), h("span", { class: "glance" }, local.method === "map" ? "MAP" : "key points")),
+  return h("details", { class: "group", open: local.open, ontoggle: (e) => { local.open = e.target.open; } }, h("summary", {}, h("span", {}, "Options"), h("span", { class: "glance" }, local.method === "map" ? "all readings" : "key points only")),
     h("div", { class: "fields stack" }, radio("method", "map", "All readings (MAP)"), radio("method", "keypoints", "Key points only (the paper's method)"),
       h("label", { class: "row tight" }, h("input", { type: "checkbox", name: "non_rigid", checked: local.non_rigid, onchange: (e) => { local.non_rigid = e.target.checked; } }), "The part may have sprung back: adapt the poses"),
       h("label", { class: "field wide" }, "Edges", h("select", { name: "edges", onchange: (e) => { local.edges = e.target.value; } }, [["", "wherever the scan crosses them"], ["true", "always"], ["false", "never"]].map(([v, text]) => h("option", { value: v, selected: v === local.edges }, text))))));

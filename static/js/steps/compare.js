@@ -30,7 +30,7 @@ export function compare(shell, a, run) {
   const row = (name, of) => h("tr", {}, h("td", {}, name), shown.map(([kind]) => h("td", { class: "num" }, of(found[kind]))));
   const after = (key, show) => (r) => show(r.prediction?.after?.[key]);
   const take = (r) => (r.number === a.number ? h("span", { class: "soft small" }, "in force") : r.verdict === "fail" ? "" : button("Use", () => use(shell, r), { class: "tiny", key: `use-${r.number}`, title: `Put alignment ${r.number} in force`, "aria-label": `Use alignment ${r.number}` }));
-  return h("div", { class: "stack" }, h("h3", {}, "Methods compared, each by its own account"),
+  return h("div", { class: "stack" }, h("h3", {}, shown.length > 1 ? "Methods compared, each by its own account" : "Compare with another method"),
     shown.length > 1 && h("table", { class: "compare" }, h("thead", {}, h("tr", {}, [h("th", {}, ""), ...shown.map(([, text]) => h("th", {}, text))])), h("tbody", {},
       row("", (r) => tag(toneOf(r.verdict), r.verdict)),
       AXES.map((axis) => row(`${axis.toUpperCase()} (${isAngle(axis) ? "deg" : "mm"})`, (r) => signed(r.correction?.[poseKey(axis)], isAngle(axis) ? 4 : 3))),

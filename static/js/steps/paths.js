@@ -8,6 +8,7 @@ import { issueList, verdict, working } from "../status.js";
 
 export const watchesView = true;
 export const watchesJobs = true;
+const ROLES = { approach: "approaching", "lead in": "leading in", data: "taking data", "lead out": "leading out", retract: "retracting", link: "moving to the next pass" };
 
 export function content(shell) {
   const { plan, part } = shell.project.data;
@@ -21,7 +22,7 @@ export function content(shell) {
     plan.stale ? verdict("warn", "Out of date", `Changed since: ${plan.stale_because.join(", ")}. Plan again.`)
       : errors ? verdict("bad", `${errors} ${errors === 1 ? "problem" : "problems"} to solve`, "A program with a problem is not written.") : verdict("good", "Planned", "Both paths keep to the tolerances of the cell."),
     h("div", { class: "row tight", role: "group", "aria-label": "Path" }, [["alignment", "Alignment scan"], ["inspection", "Inspection raster"]].map(([key, text]) => button(text, () => show(shell, local, key), { class: local.path === key ? "on" : "", "aria-pressed": String(local.path === key) }))),
-    chosen && facts([["Passes", whole(chosen.passes)], ["Poses", whole(chosen.poses)], ["Length with data on", fixed(chosen.data_length_mm / 1000, 3), "m"], ["Surface swept", pct(share(chosen))], ...(chosen.coverage?.missed_mm2 !== undefined ? [["Not covered", whole(chosen.coverage.missed_mm2), "mm²"]] : []),
+    chosen && facts([["Passes", whole(chosen.passes)], ["Poses", whole(chosen.poses)], ["Length, taking data", fixed(chosen.data_length_mm / 1000, 3), "m"], ["Surface swept", pct(share(chosen))], ...(chosen.coverage?.missed_mm2 !== undefined ? [["Not covered", whole(chosen.coverage.missed_mm2), "mm²"]] : []),
       ["Largest tilt", fixed(chosen.checks?.tilt_max_deg, 3), "deg"], ["Least clearance", fixed(chosen.checks?.clearance_min_mm, 1), "mm"], ["Poses in reach", pct(chosen.checks?.reachable_share)]]),
     walker(shell, local),
     issueList(plan.issues),
@@ -67,7 +68,7 @@ function walker(shell, local) {
   const probe = shell.view.state?.probe;
   const slide = h("input", { type: "range", min: 0, max: 1000, step: 1, value: Math.round(local.at * 1000), name: "walk", "aria-label": "Place of the probe on the path", oninput: (e) => { local.at = Number(e.target.value) / 1000; shell.view.send({ probe: { path: local.path, at: local.at } }); } });
   return h("div", { class: "stack" }, h("h3", {}, "Probe"), slide,
-    probe && probe.path === local.path && [facts([["Pose", `${whole(probe.pose)} / ${whole(probe.poses)}`], ["Pass", `${whole(probe.pass)} / ${whole(probe.passes)}`], ["Doing", h("span", {}, probe.role)], ["Standoff", mm(probe.standoff_mm), "mm"]]),
+    probe && probe.path === local.path && [facts([["Pose", `${whole(probe.pose)} / ${whole(probe.poses)}`], ["Pass", `${whole(probe.pass)} / ${whole(probe.passes)}`], ["Doing", h("span", {}, ROLES[probe.role] ?? probe.role)], ["Standoff", mm(probe.standoff_mm), "mm"]]),
       h("dl", { class: "facts" }, AXES.map((a) => [h("dt", {}, `${a.toUpperCase()} in BASE`), h("dd", {}, num(isAngle(a) ? deg(probe[poseKey(a)]) : mm(probe[poseKey(a)]), isAngle(a) ? "deg" : "mm"))]))]);
 }
 

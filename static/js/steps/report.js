@@ -9,7 +9,7 @@ import { issueList, verdict, working } from "../status.js";
 import { accept } from "./alignment.js";
 import { program } from "./programs.js";
 import { record } from "./record.js";
-import { drop, rehearse } from "./scan.js";
+import { drop, rehearse, sending } from "./scan.js";
 
 export const watchesJobs = true;
 const link = (path, text, props = {}) => h("a", { class: "btn", style: { textDecoration: "none", color: "inherit", lineHeight: "20px" }, href: href(path), ...props }, text);
@@ -26,7 +26,7 @@ export function content(shell) {
     record(shell, local),
     h("section", { class: "stack" }, h("h3", {}, "Inspection scan"), assessment ? judged(assessment) : h("p", { class: "soft small" }, "Upload the inspection scan (and the one from before the correction), or rehearse them, to see whether the front-wall echo stayed within 2 dB."), roles(shell, local)),
     assessment && report(shell, "assessments", assessment, "Report of the inspection scan"),
-    local.progress ? h("progress", { value: local.progress.share, max: 1 }) : drop(shell, local),
+    local.progress ? sending(local) : drop(shell, local),
     archive(shell),
   ];
 }
@@ -68,16 +68,18 @@ function judged(s) {
 }
 
 export function footer(shell) {
-  const { alignment: a } = shell.project.data;
+  const { alignment: a, assessment } = shell.project.data;
   if (a?.verdict === "partial" && !a.accepted && !a.stale) return button("Accept…", () => accept(shell, a), { class: "primary" });
   const chosen = roleOf(shell, shell.local.report ?? { roles: {} });
   const numbers = (role) => chosen.filter(([, r]) => r === role).map(([s]) => s.number);
   const after = numbers("after");
   const busy = shell.busy("simulate", "assessment");
+  // What was assessed already gives the same again; then the program is what there is to take.
+  const known = assessment && !assessment.stale && JSON.stringify([assessment.options?.scans, assessment.options?.before]) === JSON.stringify([after, numbers("before")]);
   const assess = () => shell.do(() => shell.project.run("/assessments", { scans: after, before: numbers("before") }));
   return [
     h("div", { class: "row tight" }, button("Rehearse uncorrected", () => rehearse(shell, "inspection"), { class: "tiny", disabled: busy }), button("Rehearse corrected", () => rehearse(shell, "corrected"), { class: "tiny", disabled: busy || !a?.program?.available })),
-    after.length ? button(busy ? "Working…" : "Assess the inspection scan", assess, { class: "primary", disabled: busy, key: "assess" })
+    after.length && !known ? button(busy ? "Working…" : "Assess the inspection scan", assess, { class: "primary", disabled: busy, key: "assess" })
       : a?.program?.available && h("a", { class: "btn primary", style: { textAlign: "center", textDecoration: "none", lineHeight: "26px" }, href: href(`${shell.project.path}/programs/corrected`), download: "" }, "Download the corrected program"),
   ];
 }

@@ -1,7 +1,7 @@
 // Step 7: the readings: uploaded from the robot, or rehearsed on the simulated scanner.
 
 import { del, get, upload } from "../api.js";
-import { askRehearsal } from "../dialog.js";
+import { askRehearsal, confirm } from "../dialog.js";
 import { button, h } from "../dom.js";
 import { histograms, maps, profile } from "../drawer/plots.js";
 import { AXES, bytes, isAngle, poseKey } from "../format.js";
@@ -16,16 +16,26 @@ export function content(shell) {
   return [
     shell.busy("simulate") && working(shell, "Rehearsing", "simulate"),
     scans?.length ? list(shell, scans) : shell.busy("simulate") ? null : verdict("none", "No scan yet", plan ? "Run the alignment program on the robot and upload its readings. No robot at hand: rehearse." : "Plan the paths first."),
-    local.progress ? h("div", { class: "stack" }, h("span", {}, local.progress.text), h("progress", { value: local.progress.share, max: 1 }), button("Cancel", local.progress.cancel, { class: "tiny" })) : drop(shell, local),
+    local.progress ? sending(local) : drop(shell, local),
     colours(shell, scans),
   ];
+}
+
+/** An upload under way. */
+export const sending = (local) => h("div", { class: "stack" }, h("span", {}, local.progress.text), h("progress", { value: local.progress.share, max: 1 }), button("Cancel", local.progress.cancel, { class: "tiny" }));
+
+/** Readings cannot be brought back: ask before they go. */
+async function remove(shell, scan) {
+  const names = scan.files.map((f) => f.name).join(", ");
+  const sure = await confirm(`Delete scan ${scan.number}?`, `${names}. What was computed from it stays, but is out of date.`, "Delete");
+  if (sure) await shell.do(async () => { await del(`${shell.project.path}/scans/${scan.number}`); await shell.project.load(["scans", "alignment"]); });
 }
 
 function list(shell, scans) {
   return h("div", { class: "stack" }, h("h3", {}, "Scans"), h("table", {}, h("tbody", {}, scans.map((s) => h("tr", {},
     h("td", {}, `#${s.number}`), h("td", { class: "l" }, s.files.map((f) => f.name).join(", "), h("br"), h("span", { class: "faint small" }, [s.origin, s.path, s.base && `BASE ${s.base}`].filter(Boolean).join(", "))),
     h("td", { class: "num" }, bytes(s.files.reduce((n, f) => n + f.bytes, 0))),
-    h("td", {}, button("✕", () => shell.do(async () => { await del(`${shell.project.path}/scans/${s.number}`); await shell.project.load(["scans", "alignment"]); }), { class: "ghost tiny", "aria-label": `Delete scan ${s.number}`, key: `del-${s.number}` })))))));
+    h("td", {}, button("✕", () => remove(shell, s), { class: "ghost tiny", "aria-label": `Delete scan ${s.number}`, key: `del-${s.number}` })))))));
 }
 
 /** Where scans are dropped; also used for inspection scans. */
