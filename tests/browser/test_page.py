@@ -155,6 +155,31 @@ def test_a_setup_edit_is_checked_saved_and_undone(server, page, pid):
     assert page.get_by_role("button", name="Save the cell").count() == 0
 
 
+def test_a_program_name_given_and_taken_back_leaves_the_plan_as_it_was(server, page, pid):
+    opened(page, server, pid, "cell")
+    field = page.locator("input[name='program_name']")
+
+    def programs() -> str:
+        return next(s["state"] for s in server.rest(f"/projects/{pid}/state")["steps"] if s["name"] == "programs")
+
+    def named(text: str) -> None:
+        before = server.rest(f"/projects/{pid}/setup")
+        field.wait_for(state="attached")
+        field.evaluate("e => { const group = e.closest('details'); if (group) group.open = true; }")
+        field.fill(text)
+        field.press("Tab")
+        page.get_by_role("button", name="Save the cell").click()
+        until(page, lambda: server.rest(f"/projects/{pid}/setup") != before, what="the saved cell")
+        page.get_by_role("button", name="Save the cell").wait_for(state="detached")
+
+    assert programs() == "done"
+    named("EB_TRIAL")
+    assert programs() != "done"
+    named("")
+    assert server.rest(f"/projects/{pid}/setup")["program_name"] is None
+    assert programs() == "done"
+
+
 def test_base_is_fitted_to_touched_points_and_saved(server, page, pid):
     opened(page, server, pid, "cell")
     setup = server.rest(f"/projects/{pid}/setup")
