@@ -9,8 +9,9 @@ from typing import Any
 import numpy as np
 
 from alignment.cloud import PointCloud
+from alignment.estimate.capture import capture
 from alignment.estimate.edge_report import LEAST_CROSSINGS, few_agree, off_edges
-from alignment.estimate.hypotheses import Hypothesis
+from alignment.estimate.hypotheses import Hypothesis, thinned
 from alignment.estimate.map import MapFit, align_map
 from alignment.estimate.problem import Problem
 from planner.issues import Issue
@@ -18,10 +19,14 @@ from planner.setup import Setup
 
 # A crossing that belongs to no edge counts as this far off (mm).
 UNMATCHED_MM = 0.5
-# Crossings that lie farther off than this, all in all (rms, mm), are worth a look for what would explain them.
-SUSPICIOUS_MM = 0.1
-# Another order of laws has to leave less than this share of it.
-BETTER = 0.5
+# Crossings that lie farther off than this, all in all (rms, mm), or ends of passes (rms of their medians), are worth a look for
+# what would explain them.
+SUSPICIOUS_MM, SUSPICIOUS_END_MM = 0.1, 0.03
+# Another order of laws has to leave less than this share of either; of ends of passes only if single crossings like it, too.
+BETTER, LIKED = 0.5, 0.9
+# An order with which the distances scatter so many times more is none.
+SCATTERS_MORE = 1.3
+SAMPLE = 4_000
 # Edges seen this much late or early (mm), and by so many standard deviations, are worth a word.
 LATE_MM, LATE_SIGMAS = 0.15, 4.0
 
@@ -67,17 +72,28 @@ def order_by_edges(
     cloud: PointCloud, problem: Problem, found: MapFit, hypotheses: list[Hypothesis]
 ) -> Hypothesis | None:
     """Return the order of laws with which the crossings lie on their edges, where with the given one they do not."""
-    off_mm = _off_edges_mm(found)
-    if off_mm <= SUSPICIOUS_MM:
+    off_mm, end_mm = _off_edges_mm(found), _off_ends_mm(found)
+    if off_mm <= SUSPICIOUS_MM and end_mm <= SUSPICIOUS_END_MM:
         return None
-    best, chosen = BETTER * off_mm, None
+    small = thinned(cloud, SAMPLE)
+    most_mm = SCATTERS_MORE * capture(small, problem).scatter_mm
+    least, chosen = off_mm, None
     for hypothesis in hypotheses:
-        if not hypothesis.of_laws:
+        if not hypothesis.of_laws or capture(hypothesis.apply(small), problem).scatter_mm > most_mm:
             continue
         other = align_map(hypothesis.apply(cloud), problem.curved, problem.setup)
-        if isinstance(other, MapFit) and other.converged and _enough(other) and _off_edges_mm(other) < best:
-            best, chosen = _off_edges_mm(other), hypothesis
+        if not (isinstance(other, MapFit) and other.converged and _enough(other)):
+            continue
+        other_mm = _off_edges_mm(other)
+        ends_agree = _off_ends_mm(other) < BETTER * end_mm and other_mm < LIKED * off_mm
+        if other_mm < least and (other_mm < BETTER * off_mm or ends_agree):
+            least, chosen = other_mm, hypothesis
     return chosen
+
+
+def _off_ends_mm(found: MapFit) -> float:
+    """Return how far the ends of passes lie off their edges (rms of their medians, mm); 0 without crossings."""
+    return 0.0 if found.edges is None else float(found.edges["off_mm"])
 
 
 def _enough(found: MapFit) -> bool:

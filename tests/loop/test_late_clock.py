@@ -3,6 +3,7 @@
 import re
 
 import numpy as np
+import polars as pl
 import pytest
 
 from alignment.simulator import Noise, Truth, simulate, write_readings_csv
@@ -65,3 +66,19 @@ def test_the_delay_is_measured_and_the_part_stays_where_it_is(folder, latency_ms
     said = next(i["message"] for i in found["issues"] if i["code"] == "edges-late")
     assert ("late" if latency_ms > 0 else "early") in said
     assert float(re.search(r"([\d.]+) ms at 60 mm/s", said)[1]) == pytest.approx(abs(latency_ms), abs=1.5)
+
+
+@pytest.mark.parametrize("seed", [4, 5])
+def test_laws_in_reverse_order_on_a_turned_plate_are_no_late_clock(folder, seed):
+    """With the plate turned by 0.3 deg they put it 0.6 deg off, and nearly all of what is left looks like a delay."""
+    plan, reading = load_plan(folder), read_folder(folder, "alignment")
+    write_readings_csv(
+        simulate(plan.part, plan.surface, reading.path, plan.setup, Truth(OFFSET), Noise(), seed), folder / "scan.csv"
+    )
+    table = pl.read_csv(folder / "scan.csv", comment_prefix="#")
+    laws = plan.setup.probe.laws
+    table.with_columns((laws + 1 - pl.col("law")).alias("law")).write_csv(folder / "reversed.csv")
+    for name, wrong in (("scan", False), ("reversed", True)):
+        found = run_align(folder, [folder / f"{name}.csv"], AlignOptions(), quiet).correction
+        assert ("laws-reversed" in {i["code"] for i in found["issues"]}) == wrong
+        assert (found["verdict"] == "fail") == wrong
