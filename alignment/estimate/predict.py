@@ -23,7 +23,7 @@ from planner.surface.curved import CurvedSurface
 from planner.toolpath import ToolPath
 
 # The reference noise of every published figure (simulated): pose 0.03 mm per axis and 0.005 deg, correlated over 10 mm;
-# ToF 0.01 mm. Crossings of edges scatter by about 0.08 mm beside the pose.
+# ToF 0.01 mm. Crossings of edges scatter by about 0.025 mm beside the pose.
 REFERENCE_MM = {
     "nugget_mm": 0.01,
     "path_mm": 0.03,
@@ -32,7 +32,7 @@ REFERENCE_MM = {
     "tilt_mm": 0.0013,
     "field_mm": 0.0005,
     "field_length_mm": 50.0,
-    "edge_nugget_mm": 0.08,
+    "edge_nugget_mm": 0.025,
     "edge_path_mm": 0.03,
 }
 MOST_POINTS = 5000
