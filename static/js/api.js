@@ -25,7 +25,7 @@ const tags = new Map();
 export const etagOf = (path) => tags.get(path) ?? null;
 
 /** One request; returns the JSON (or null). Network failures become an ApiError too. */
-export async function call(method, path, body, headers = {}) {
+export async function call(method, path, body, headers = {}, within_ms = null) {
   let answer;
   try {
     answer = await fetch(`${API}${path}`, {
@@ -33,6 +33,7 @@ export async function call(method, path, body, headers = {}) {
       credentials: "same-origin",
       headers: { Accept: "application/json", ...(body === undefined ? {} : { "Content-Type": "application/json" }), ...headers },
       body: body === undefined ? undefined : JSON.stringify(body),
+      signal: within_ms === null ? undefined : AbortSignal.timeout(within_ms),
     });
   } catch {
     throw new ApiError(0, [{ severity: "error", code: "offline", message: "The server cannot be reached.", remedy: "The page reconnects by itself.", where: "" }]);
@@ -46,7 +47,7 @@ export async function call(method, path, body, headers = {}) {
   return parsed;
 }
 
-export const get = (path) => call("GET", path);
+export const get = (path, within_ms = null) => call("GET", path, undefined, {}, within_ms);
 export const post = (path, body = {}) => call("POST", path, body);
 /** PUT guarded by the ETag seen last, so that nobody overwrites what he has not seen. */
 export const put = (path, body) => call("PUT", path, body, tags.has(path) ? { "If-Match": tags.get(path) } : {});

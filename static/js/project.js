@@ -21,6 +21,9 @@ const CONCERNS = {
 const PATHS = { project: "", part: "/part", setup: "/setup", surface: "/surface", keypoints: "/keypoints", plan: "/plan", scans: "/scans", alignment: "/alignments", assessment: "/assessments", record: "/record", calibrations: "/calibrations", state: "/state" };
 const OPEN = new Set(["queued", "running"]);
 const NEWEST = new Set(["alignment", "assessment"]);
+// An answer that takes longer than this is given up; what did not come is asked for again so much later.
+const SOON_MS = 60_000;
+const AGAIN_MS = 1_500;
 const ALL = ["project", "part", "setup", "surface", "keypoints", "plan", "scans", "alignment", "assessment", "record", "calibrations"];
 
 export class Project {
@@ -35,7 +38,7 @@ export class Project {
     this.stop = listen(`${this.path}/events`, ["changed", "job", "insight", "people", "view", "view-error", "resync"], (name, data) => this.hear(name, data), (up) => this.link(up));
   }
 
-  close() { this.stop(); clearTimeout(this.timer); }
+  close() { this.closed = true; this.stop(); clearTimeout(this.timer); }
 
   link(up) {
     if (this.online === up) return;
@@ -117,13 +120,15 @@ export class Project {
 
   async fetchOne(name) {
     try {
-      const answer = await get(`${this.path}${PATHS[name]}`);
+      const answer = await get(`${this.path}${PATHS[name]}`, SOON_MS);
       // Of results the newest counts.
       this.data[name] = NEWEST.has(name) ? (answer.at(-1) ?? null) : answer;
       if (NEWEST.has(name)) this.data[`${name}s`] = answer;
     } catch (error) {
       if (error instanceof ApiError && [404, 409].includes(error.status)) this.data[name] = null;
       if (["project", "state"].includes(name) && error.status === 404) this.deleted = true;
+      // What did not come is asked for again: no later event may tell of it.
+      if (!(error instanceof ApiError) || error.status === 0 || error.status >= 500) setTimeout(() => this.closed || this.load([name]), AGAIN_MS);
     }
   }
 

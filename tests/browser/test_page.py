@@ -259,6 +259,34 @@ def test_two_browsers_see_each_others_key_points(server, page, chromium, pid):
     other.close()
 
 
+@pytest.mark.parametrize("lost", ["refused", "cut off"])
+def test_an_answer_that_did_not_come_is_asked_for_again(server, chromium, pid, lost):
+    """Without another event, which may never come."""
+    before = server.rest(f"/projects/{pid}/keypoints")
+    other = chromium.new_page(viewport={"width": 1024, "height": 680})
+    other.goto(f"{server.url}/#/p/{pid}/keypoints")
+    journey.chosen(other)
+    left = [3]
+
+    def fail(route):
+        left[0] -= 1
+        if left[0] < 0:
+            route.continue_()
+        elif lost == "refused":
+            route.fulfill(status=503, json={"error": {"message": "busy"}})
+        else:
+            route.abort()
+
+    other.route("**/keypoints", lambda route: fail(route) if route.request.method == "GET" else route.continue_())
+    other.get_by_role("button", name="Clear").click()
+    until(other, lambda: server.rest(f"/projects/{pid}/keypoints") == [], what="the edit")
+    other.get_by_text("No key points yet").first.wait_for(timeout=journey.SLOW)
+    until(other, lambda: left[0] < 0, what="the answer asked for again")
+    other.get_by_role("button", name="Undo").click()
+    until(other, lambda: server.rest(f"/projects/{pid}/keypoints") == before, what="the undo")
+    other.close()
+
+
 def test_the_page_goes_on_after_the_server_was_killed(server, page, pid):
     opened(page, server, pid, "keypoints")
     journey.chosen(page)
