@@ -1,11 +1,6 @@
 """Runs every benchmark in turn: `python -m benchmarks [name ...]`."""
 
-import os
 import sys
-
-os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")  # as the application sets it, before numpy is imported
-os.environ.setdefault("OMP_NUM_THREADS", "1")
-
 from runpy import run_module
 
 NAMES = {"loading": "benchmarks.loading", "planning": "benchmarks.planning", "alignment": "benchmarks.alignment.speed"}

@@ -21,7 +21,7 @@ const CONCERNS = {
 const PATHS = { project: "", part: "/part", setup: "/setup", surface: "/surface", keypoints: "/keypoints", plan: "/plan", scans: "/scans", alignment: "/alignments", assessment: "/assessments", record: "/record", calibrations: "/calibrations", state: "/state" };
 const OPEN = new Set(["queued", "running"]);
 const NEWEST = new Set(["alignment", "assessment"]);
-// An answer that takes longer than this is given up; what did not come is asked for again so much later.
+// An answer that takes longer than this is given up; what did not come is asked for again so much later at first.
 const SOON_MS = 60_000;
 const AGAIN_MS = 1_500;
 const ALL = ["project", "part", "setup", "surface", "keypoints", "plan", "scans", "alignment", "assessment", "record", "calibrations"];
@@ -34,6 +34,7 @@ export class Project {
     this.data = { jobs: new Map(), insight: null, people: { clients: 0, names: [] }, viewIssues: [] };
     this.online = true;
     this.pending = new Set();
+    this.missed = new Map();
     this.undoSetups = [];
     this.stop = listen(`${this.path}/events`, ["changed", "job", "insight", "people", "view", "view-error", "resync"], (name, data) => this.hear(name, data), (up) => this.link(up));
   }
@@ -122,14 +123,22 @@ export class Project {
     try {
       const answer = await get(`${this.path}${PATHS[name]}`, SOON_MS);
       // Of results the newest counts.
+      this.missed.delete(name);
       this.data[name] = NEWEST.has(name) ? (answer.at(-1) ?? null) : answer;
       if (NEWEST.has(name)) this.data[`${name}s`] = answer;
     } catch (error) {
       if (error instanceof ApiError && [404, 409].includes(error.status)) this.data[name] = null;
       if (["project", "state"].includes(name) && error.status === 404) this.deleted = true;
-      // What did not come is asked for again: no later event may tell of it.
-      if (!(error instanceof ApiError) || error.status === 0 || error.status >= 500) setTimeout(() => this.closed || this.load([name]), AGAIN_MS);
+      if (!(error instanceof ApiError) || error.status === 0 || error.status >= 500) this.askAgain(name);
     }
+  }
+
+  // What did not come is asked for again, as no later event may tell of it; less and less often, as every answer redraws the
+  // page. Without a link all is asked for when it is back.
+  askAgain(name) {
+    const times = (this.missed.get(name) ?? 0) + 1;
+    this.missed.set(name, times);
+    setTimeout(() => { if (this.online && !this.closed) this.load([name]); }, Math.min(AGAIN_MS * 2 ** (times - 1), SOON_MS));
   }
 
   /** Start a job and wait for its end; resolves with the job, rejects with an ApiError. */
